@@ -60,8 +60,9 @@ BAGS = {
 @pytest.mark.parametrize("kind", BAGS)
 def test_the_description_is_that_of_the_recording(recording, program, tmp_path, kind):
     bag = BAGS[kind](tmp_path, recording)
-    info = json.loads(program("data", "info", bag, "--json"))
-    assert info["warnings"] == [] and len(info["missing"]) == 1
+    program("rig", "convert", recording.folder, tmp_path / "rig.yaml")
+    info = json.loads(program("data", "info", bag, "--rig", tmp_path / "rig.yaml", "--json"))
+    assert info["warnings"] == [] and info["missing"] == [] and info["refused"] is None
     assert [stream["name"] for stream in info["streams"]] == ["/cam0/image_raw", "/cam1/image_raw"]
     for camera, stream in enumerate(info["streams"]):
         assert stream["camera"] == camera and stream["count"] == len(recording.stamps)

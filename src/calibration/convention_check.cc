@@ -164,7 +164,10 @@ std::string_view convention_in_words(Convention convention) {
 PairEvidence judge_pair(const camera::Rig& rig, std::size_t i, std::size_t j, std::span<const feature::Detections> of_i,
                         std::span<const feature::Detections> of_j) {
   const std::size_t instants = std::min(of_i.size(), of_j.size());
-  PairEvidence evidence{.first = i, .second = j, .instants = static_cast<int>(instants)};
+  PairEvidence evidence{.first = i,
+                        .second = j,
+                        .instants = static_cast<int>(instants),
+                        .overlap = std::max(rig.overlap_share(i, j), rig.overlap_share(j, i))};
   std::vector<PixelPair> all;
   for (std::size_t frame = 0; frame < instants; ++frame) {
     const std::vector<PixelPair> pairs = match(of_i[frame], of_j[frame]);
@@ -213,22 +216,64 @@ std::vector<std::vector<View>> extract_views(const camera::Rig& rig, std::span<c
   return views;
 }
 
+// The keypoints of a camera in mirrored images.
+std::vector<View> mirrored_views(const camera::Rig& rig, std::size_t camera,
+                                 std::span<const image::ImageBundle> frames) {
+  feature::Extractor extractor({});
+  image::Pyramid pyramid;
+  std::vector<View> out(frames.size());
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    const image::CameraImage& image = frames[k].images[camera];
+    if (image.state != image::ImageState::kPresent) continue;
+    image::Image reversed = image::copy_of(image.view());
+    for (int y = 0; y < reversed.height(); ++y) std::reverse(reversed.row(y), reversed.row(y) + reversed.width());
+    out[k].time_ns = image.time_ns;
+    extractor.extract(reversed.view(), {}, rig.camera(camera), pyramid, out[k].keypoints);
+  }
+  return out;
+}
+
+PairEvidence judge_views(const camera::Rig& rig, std::size_t i, std::size_t j, const std::vector<View>& first,
+                         const std::vector<View>& second) {
+  std::vector<feature::Detections> of_i, of_j;
+  for (std::size_t k = 0; k < first.size(); ++k) {
+    const View &a = first[k], &b = second[k];
+    if (!a.time_ns || !b.time_ns || std::abs(*a.time_ns - *b.time_ns) > frame::kTogetherNs) continue;
+    of_i.push_back(a.keypoints);
+    of_j.push_back(b.keypoints);
+  }
+  return judge_pair(rig, i, j, of_i, of_j);
+}
+
+// Finds which of the two cameras has mirrored images. Scenes may be symmetric, so that the geometry must agree as well.
+std::optional<MirroredCamera> find_mirrored(const camera::Rig& rig, const PairEvidence& pair,
+                                            std::span<const image::ImageBundle> frames,
+                                            const std::vector<std::vector<View>>& views) {
+  constexpr int kMinMatches = 100, kTimes = 3;
+  for (const std::size_t c : {pair.second, pair.first}) {
+    const std::vector<View> reversed = mirrored_views(rig, c, frames);
+    const PairEvidence again = judge_views(rig, pair.first, pair.second, c == pair.first ? reversed : views[pair.first],
+                                           c == pair.second ? reversed : views[pair.second]);
+    const int agreeing = again.agreeing[0];
+    if (again.verdict == Convention::kAsGiven && agreeing >= kMinMatches && agreeing >= kGoodRatio * again.matches &&
+        agreeing >= kTimes * pair.agreeing[0])
+      return MirroredCamera{c, again.matches, agreeing};
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
 std::vector<PairEvidence> check_conventions(const camera::Rig& rig, std::span<const image::ImageBundle> frames,
                                             std::span<const image::Image> masks) {
+  constexpr double kSomeOverlap = 0.2;
   const std::vector<std::vector<View>> views = extract_views(rig, frames, masks);
   std::vector<PairEvidence> evidence;
   for (std::size_t i = 0; i < rig.size(); ++i) {
     for (std::size_t j = i + 1; j < rig.size(); ++j) {
-      std::vector<feature::Detections> of_i, of_j;
-      for (std::size_t k = 0; k < views[i].size(); ++k) {
-        const View &a = views[i][k], &b = views[j][k];
-        if (!a.time_ns || !b.time_ns || std::abs(*a.time_ns - *b.time_ns) > frame::kTogetherNs) continue;
-        of_i.push_back(a.keypoints);
-        of_j.push_back(b.keypoints);
-      }
-      evidence.push_back(judge_pair(rig, i, j, of_i, of_j));
+      PairEvidence& pair = evidence.emplace_back(judge_views(rig, i, j, views[i], views[j]));
+      if (!pair.verdict && pair.instants > 0 && pair.overlap >= kSomeOverlap)
+        pair.mirrored = find_mirrored(rig, pair, frames, views);
     }
   }
   return evidence;
@@ -236,6 +281,13 @@ std::vector<PairEvidence> check_conventions(const camera::Rig& rig, std::span<co
 
 std::string describe_pair(const PairEvidence& pair) {
   const auto agreeing = [&](Convention c) { return pair.agreeing[static_cast<std::size_t>(c)]; };
+  if (pair.mirrored) {
+    return fmt::format(
+        "{} of {} matches are consistent with the calibration if the images of camera {} are mirrored left to right; "
+        "{} "
+        "with it as given",
+        pair.mirrored->agreeing, pair.mirrored->matches, pair.mirrored->camera, agreeing(Convention::kAsGiven));
+  }
   if (pair.exchanged) {
     return fmt::format(
         "{} of {} matches are consistent with the calibrations of {} and {} in place of those of the two cameras; {} "
@@ -250,10 +302,12 @@ std::string describe_pair(const PairEvidence& pair) {
         pair.other->agreeing, pair.matches, pair.other->rotated_deg, pair.other->displaced_deg,
         agreeing(Convention::kAsGiven));
   }
-  if (pair.instants == 0) return "no images taken at the same time: nothing to compare";
+  if (pair.instants == 0) return "not tested: no images taken at the same time, so there is nothing to compare";
   if (!pair.verdict && pair.matches > kMany)
     return fmt::format("{} matches, but too few are consistent with any convention", pair.matches);
-  if (!pair.verdict) return fmt::format("too few matches for a decision ({})", pair.matches);
+  if (!pair.verdict)
+    return fmt::format("not tested: too few matches for a decision ({}); the calibrated views overlap by {:.0f} %",
+                       pair.matches, 100 * pair.overlap);
   std::string text = fmt::format("{} of {} matches are consistent with the calibration {}", agreeing(*pair.verdict),
                                  pair.matches, convention_in_words(*pair.verdict));
   if (*pair.verdict != Convention::kAsGiven)
@@ -280,14 +334,32 @@ std::string unjudged(std::span<const PairEvidence> evidence) {
       cameras.empty() ? "" : fmt::format(", among them all pairs of camera {}", fmt::join(cameras, ", ")));
 }
 
+// Pairs that should have been tested, since the calibrated views overlap.
+std::string warning_of_untested(std::span<const PairEvidence> evidence) {
+  constexpr double kMuchOverlap = 0.4;  // opposite fisheyes with less hardly match at the edges of their views
+  std::vector<std::string> untested;
+  std::size_t common = 0;
+  for (const PairEvidence& pair : evidence) {
+    if (pair.overlap < kMuchOverlap) continue;
+    ++common;
+    if (!pair.verdict && !pair.exchanged && !pair.other && !pair.mirrored)
+      untested.push_back(fmt::format("{} and {}", pair.first, pair.second));
+  }
+  if (untested.empty()) return "";
+  return fmt::format("warning: {} of {} pairs with much overlap could not be tested: cameras {}\n", untested.size(),
+                     common, fmt::join(untested, ", "));
+}
+
 }  // namespace
 
 std::string describe_evidence(std::span<const PairEvidence> evidence) {
   std::string text = "test against the images:\n";
+  std::set<std::size_t> mirrored;
   std::map<Convention, std::vector<std::string>> mistakes;  // pairs
   int fitting = 0, elsewhere = 0, exchanged = 0;
   for (const PairEvidence& pair : evidence) {
     text += fmt::format("  cameras {} and {}: {}\n", pair.first, pair.second, describe_pair(pair));
+    if (pair.mirrored) mirrored.insert(pair.mirrored->camera);
     elsewhere += pair.other ? 1 : 0;
     exchanged += pair.exchanged ? 1 : 0;
     if (pair.verdict == Convention::kAsGiven) ++fitting;
@@ -295,6 +367,8 @@ std::string describe_evidence(std::span<const PairEvidence> evidence) {
       mistakes[*pair.verdict].push_back(fmt::format("{} and {}", pair.first, pair.second));
     }
   }
+  for (const std::size_t camera : mirrored)
+    text += fmt::format("warning: the images of camera {} are mirrored left to right\n", camera);
   if (!mistakes.empty()) {
     const auto most = std::ranges::max_element(mistakes, {}, [](const auto& mistake) { return mistake.second.size(); });
     const auto& pairs = most->second;
@@ -308,6 +382,7 @@ std::string describe_evidence(std::span<const PairEvidence> evidence) {
   if (exchanged > 0)
     return text + "warning: the images contradict the extrinsics; they are consistent with exchanged cameras\n";
   if (elsewhere > 0) return text + "warning: the images contradict the extrinsics, and no common mistake explains it\n";
+  text += warning_of_untested(evidence);
   if (fitting == 0) return text + "  the extrinsics could not be tested\n";
   text += "  the extrinsics are consistent with the images" + unjudged(evidence) + "\n";
   return text +

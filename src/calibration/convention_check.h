@@ -46,10 +46,18 @@ struct OtherCalibrations {
   int agreeing = 0;                    // matches consistent with them
 };
 
+// A camera whose images are mirrored, left to right: only if they are mirrored again, matches are consistent with the
+// calibration as given.
+struct MirroredCamera {
+  std::size_t camera = 0;
+  int matches = 0, agreeing = 0;  // with the images mirrored again
+};
+
 // Evidence on one pair of cameras.
 struct PairEvidence {
   std::size_t first = 0, second = 0;
   int instants = 1;                             // times at which both cameras have an image
+  double overlap = 1;                           // largest fraction of the view of one that the other observes as well
   int matches = 0;                              // feature matches, over all frames
   std::array<int, kConventions> agreeing = {};  // matches consistent with each convention
   // The convention with most consistent matches, if there are enough of them and, for any but kAsGiven, clearly more
@@ -57,6 +65,7 @@ struct PairEvidence {
   std::optional<Convention> verdict = {};
   std::optional<OtherCalibrations> exchanged = {};
   std::optional<OtherPose> other = {};
+  std::optional<MirroredCamera> mirrored = {};
 };
 
 // Tests the pair (i, j) with keypoints of images taken at the same times. `of_i` and `of_j` have one entry per frame.
@@ -64,15 +73,15 @@ PairEvidence judge_pair(const camera::Rig& rig, std::size_t i, std::size_t j, st
                         std::span<const feature::Detections> of_j);
 
 // Tests every pair of cameras (i, j), i < j, with the images that they took at the same time. A few frames spread over
-// a recording suffice. `masks` has one image per camera, empty or of its resolution; keypoints where it is 0 are
-// ignored.
+// a recording suffice. Pairs with overlap that have no verdict are tested with mirrored images as well. `masks` has
+// one image per camera, empty or of its resolution; keypoints where it is 0 are ignored.
 std::vector<PairEvidence> check_conventions(const camera::Rig& rig, std::span<const image::ImageBundle> frames,
                                             std::span<const image::Image> masks);
 
 // The evidence on a pair in words, such as "90 of 100 matches are consistent with the calibration as given".
 std::string describe_pair(const PairEvidence& pair);
 
-// The report for users: one line per pair and a conclusion.
+// The report for users: one line per pair and a conclusion. Warns of pairs with much overlap that could not be tested.
 std::string describe_evidence(std::span<const PairEvidence> evidence);
 
 }  // namespace bslam::calibration

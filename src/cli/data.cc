@@ -20,8 +20,8 @@ int data_info(const InfoArguments& arguments) {
   if (!request) return report_error(request.error());
   const auto report = session::report_data(*request, arguments.json);
   if (!report) return report_error(report.error());
-  std::fputs(report->c_str(), stdout);
-  return kExitOk;
+  std::fputs(report->text.c_str(), stdout);
+  return report->runs ? kExitOk : kExitBadInput;
 }
 
 }  // namespace

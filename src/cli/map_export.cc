@@ -1,4 +1,5 @@
 // bslam map export: a saved map in formats of other programs.
+#include <algorithm>
 #include <cstdio>
 #include <memory>
 #include <optional>
@@ -8,6 +9,7 @@
 #include "cli/dataset_arguments.h"
 #include "cli/verbs.h"
 #include "dataset/dataset.h"
+#include "map/rigs_of_map.h"
 #include "map_export/export_map.h"
 #include "storage/map_file.h"
 
@@ -22,10 +24,13 @@ struct ExportArguments {
   map_export::ExportRequest request;
 };
 
-Result<dataset::Dataset> open_recording(const ExportArguments& arguments) {
+// A recording without a calibration has that of the map, if it is of one rig.
+Result<dataset::Dataset> open_recording(const ExportArguments& arguments, const map::BundledMap& map) {
   constexpr double kTolerance_s = 0.1;  // includes images of cameras that are not synchronised
   dataset::DatasetRequest request{.path = arguments.images, .sync_tolerance_s = kTolerance_s};
   if (!arguments.rig.empty()) request.rig_file = arguments.rig;
+  const std::vector<std::size_t> rigs = map::first_cameras_of_rigs(map);
+  if (std::ranges::all_of(rigs, [](std::size_t first) { return first == 0; })) request.rig_of_map = map.given_rig();
   if (const Status s = apply_image_options(arguments.image_options, request); !s) return s.error();
   return dataset::open_dataset(request);
 }
@@ -54,7 +59,7 @@ int run_map_export(ExportArguments arguments) {
   if (!saved) return report_error(saved.error());
   std::optional<dataset::Dataset> data;
   if (!arguments.images.empty()) {
-    auto opened = open_recording(arguments);
+    auto opened = open_recording(arguments, saved->map);
     if (!opened) return report_error(opened.error());
     data = *std::move(opened);
   }
@@ -83,7 +88,8 @@ void add_map_export(CLI::App& map, int& exit_status) {
   out->add_option("--out", request.out, "folder or file to write")->required();
   out->add_option("--images", arguments->images, "recording of the map: for names of images and colours of points");
   add_image_options(*out, arguments->image_options);
-  out->add_option("--rig", arguments->rig, "calibration of the recording, as for bslam run");
+  out->add_option("--rig", arguments->rig,
+                  "calibration of the recording, as for bslam run; default: that in it, or else that of the map");
   out->add_flag("--undistort", request.undistort,
                 "colmap, nerfstudio: write undistorted images of the keyframes, with pinhole cameras");
   out->add_option("--submap", request.submap, "number of the submap to export; default: the one with most landmarks");

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <cmath>
 #include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -40,19 +41,46 @@ void print_json(const session::MergeResult& merged) {
                       {"joined", input.reason.empty()},
                       {"reason", input.reason}});
   }
+  nlohmann::ordered_json scales = nlohmann::ordered_json::array();
+  for (const session::ScaleComparison& c : merged.scales) {
+    scales.push_back({{"files", {merged.inputs[c.first].file, merged.inputs[c.second].file}},
+                      {"ratio", c.ratio},
+                      {"deviation", c.deviation},
+                      {"keyframes", c.views},
+                      {"disagree", c.disagrees()}});
+  }
   const nlohmann::ordered_json all = {{"schema", 1},
                                       {"keyframes", merged.map.num_keyframes()},
                                       {"landmarks", merged.map.num_landmarks()},
                                       {"submaps", merged.map.roots().size()},
                                       {"merged", merged.joined},
                                       {"loops", merged.loops},
-                                      {"inputs", std::move(inputs)}};
+                                      {"inputs", std::move(inputs)},
+                                      {"scales", std::move(scales)}};
   std::printf("%s\n", all.dump(1, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+}
+
+// The maps are not scaled: metric maps whose scales differ contain a wrong calibration.
+void warn_of_scales(const session::MergeResult& merged) {
+  for (const session::ScaleComparison& c : merged.scales) {
+    if (!c.disagrees()) continue;
+    fmt::print(
+        stderr,
+        "warning: the scales of {} and {} disagree: lengths are {:.2f} % {} in the second (std {:.2f} %); no map "
+        "was scaled, so the merged map is distorted: check the baselines of both calibrations\n",
+        merged.inputs[c.first].file, merged.inputs[c.second].file, 100 * std::abs(c.ratio - 1),
+        c.ratio > 1 ? "longer" : "shorter", 100 * c.deviation);
+  }
 }
 
 void print_text(const session::MergeResult& merged) {
   for (const session::MergedInput& input : merged.inputs) {
     if (!input.reason.empty()) fmt::print("not joined: {}: {} (submap {})\n", input.file, input.reason, input.submap);
+  }
+  for (const session::ScaleComparison& c : merged.scales) {
+    fmt::print("{}: lengths in {} are {:.4f} (std {:.4f}) times those in {}\n",
+               c.disagrees() ? "scales disagree" : "scales agree", merged.inputs[c.second].file, c.ratio,
+               c.deviation * c.ratio, merged.inputs[c.first].file);
   }
   fmt::print("{} keyframes, {} landmarks; merged {}, {}, {} remaining\n", merged.map.num_keyframes(),
              merged.map.num_landmarks(), counted(static_cast<std::size_t>(merged.joined), "submap"),
@@ -93,6 +121,7 @@ int map_merge(const MergeArguments& arguments) {
   if (!arguments.dry_run) {
     if (const Status s = write(*merged, **vocabulary, arguments.out); !s) return report_error(s.error());
   }
+  warn_of_scales(*merged);
   arguments.json ? print_json(*merged) : print_text(*merged);
   if (!arguments.dry_run && !arguments.json) fmt::print("{}\n", arguments.out);
   return kExitOk;

@@ -78,6 +78,9 @@ int run(RunArguments& arguments) {
   // Created first: once the output folder exists, an interruption ends the run with complete output files.
   const Interruption interruption;
   arguments.slam.rig = arguments.data.rig;
+  if (arguments.late == "drop" && arguments.pace != "realtime" && arguments.replay.empty())
+    return report_error({"command line", "--late", "drop without --pace realtime",
+                         "--pace realtime as well, since no frame is late otherwise"});
   const auto config = resolve_run_config(arguments.slam);
   if (!config) return report_error(config.error());
   auto replay = read_journal(arguments.replay);

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdio>
+#include <string_view>
 
 namespace bslam::cli {
 
@@ -57,6 +58,15 @@ std::string doubt_text(const session::RunRecord& record) {
   return text;
 }
 
+// Why the calibration could not be tested.
+std::string_view untested_text(const session::RunRecord& record) {
+  if (record.cameras.size() < 2) return "calibration: not tested, which takes several cameras: there is a single one";
+  if (record.map.scale != "metric") return "calibration: not tested, which takes a map of metric scale";
+  return "calibration: not tested, which takes more motion, and landmarks in several keyframes, or calibration.check "
+         "is "
+         "false";
+}
+
 // Whether the images agree with the calibration. Silence would be taken for agreement.
 void print_verdict(const session::RunRecord& record) {
   const session::CalibrationRecord& calibration = record.calibration;
@@ -74,7 +84,7 @@ void print_verdict(const session::RunRecord& record) {
   const std::string doubt = doubt_text(record);
   if (!doubt.empty()) return fmt::print("calibration: cannot be told ({})\n", doubt);
   if (record.map.loaded) return fmt::print("calibration: not tested in a loaded map\n");
-  fmt::print("calibration: not tested, which takes several cameras, enough motion and calibration.check\n");
+  fmt::print("{}\n", untested_text(record));
 }
 
 }  // namespace

@@ -74,6 +74,20 @@ Status prepare_folder(const SlamArguments& arguments) {
   return {};
 }
 
+// Says that the map has the cameras of this run under other names: they are taken to be the same by their calibrations.
+void print_other_names(const std::string& file, const map::BundledMap& map, const camera::Rig& rig) {
+  const auto first = map::find_rig(map, rig);
+  std::string text;
+  for (std::size_t c = 0; first && c < rig.size(); ++c) {
+    const std::string &in_map = map.rig().camera(*first + c).name, &here = rig.camera(c).name;
+    if (in_map != here) text += fmt::format("{}{} = {}", text.empty() ? "" : ", ", here, in_map);
+  }
+  if (!text.empty())
+    std::fprintf(stderr,
+                 "note: %s has other names for the cameras of this run, which are known by their calibrations: %s\n",
+                 file.c_str(), text.c_str());
+}
+
 // Reads the map of an earlier run if one is given, and checks that this run can continue with it.
 Result<std::optional<storage::SavedMap>> read_map(const SlamArguments& arguments, const camera::Rig& rig,
                                                   const system::Config& config, const place::Vocabulary& vocabulary) {
@@ -83,6 +97,7 @@ Result<std::optional<storage::SavedMap>> read_map(const SlamArguments& arguments
   if (!saved) return saved.error();
   const map::BundledMap& map = saved->map;
   if (const Status status = system::check_settings(config, map, rig); !status) return status.error();
+  if (log_verbosity(arguments.log_level) >= LogVerbosity::kWarning) print_other_names(file, map, rig);
   if (system::shared_with_other_rigs(map, rig) && log_verbosity(arguments.log_level) >= LogVerbosity::kWarning) {
     const char* const text = map::find_rig(map, rig)
                                  ? "has further cameras; the calibration is that of the map and is not estimated"
@@ -95,7 +110,7 @@ Result<std::optional<storage::SavedMap>> read_map(const SlamArguments& arguments
 // What is stored with the map of a run. `map_warning`: what was wrong with the map that it continued.
 storage::MapFileInfo map_info(const session::RunRecord& record, const place::Vocabulary& vocabulary,
                               const std::string& map_warning) {
-  const std::string warning = session::foreign_images_text(record);
+  const std::string warning = session::unreliable_map_text(record);
   return {vocabulary.id(), record.version, record.data, warning.empty() ? map_warning : warning};
 }
 
@@ -106,11 +121,10 @@ std::vector<Error> write_files(const session::SessionResult& result, const syste
   const auto report = arguments.no_report
                           ? std::nullopt
                           : std::optional(session::ReportSource{dataset, arguments.command, arguments.up});
-  std::vector<Error> errors;
+  std::vector<Error> errors = session::write_outputs(result, config, arguments.out, report);
   const auto note = [&errors](const Status& status) {
     if (!status) errors.push_back(status.error());
   };
-  note(session::write_outputs(result, config, arguments.out, report));
   if (!arguments.journal.empty()) note(write_atomically(arguments.journal, execution::journal_text(result.journal)));
   if (!arguments.save_map.empty()) note(storage::write_map(*result.map, info, arguments.save_map));
   return errors;
@@ -240,7 +254,7 @@ Status check_outputs(const SlamArguments& arguments) {
   const bool writes_rerun = !is_viewer(arguments.rerun);
   for (const auto& [option, file, begin] : {std::tuple("--save-map", arguments.save_map, "BSLAMMAP"),
                                             std::tuple("--journal", arguments.journal, "bslam-journal"),
-                                            std::tuple("--rerun", writes_rerun ? arguments.rerun : "", "")}) {
+                                            std::tuple("--rerun", writes_rerun ? arguments.rerun : "", "RRF")}) {
     if (const Status s = check_output_file(file, option, arguments.overwrite, begin); !s) return s;
   }
   return arguments.rerun.empty() ? Status() : check_rerun(arguments.rerun);

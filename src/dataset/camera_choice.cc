@@ -27,10 +27,24 @@ std::vector<int> folders_by_name(const std::vector<std::string>& folders, const 
   return out;
 }
 
+// For messages: where the calibration is from.
+std::string origin_of(const DatasetRequest& request) {
+  return request.rig_file ? request.rig_file->string() : request.rig_of_map ? "the map" : "the calibration";
+}
+
 std::string names_of(const camera::Rig& rig) {
   std::vector<std::string> names;
   for (std::size_t c = 0; c < rig.size(); ++c) names.push_back(rig.camera(c).name);
   return fmt::format("{}", fmt::join(names, ", "));
+}
+
+// Returns true if the recording has just the cameras that are selected: a single folder, or folders that are named in
+// the order of cameras of which there are none of these numbers.
+bool are_those_selected(const DatasetRequest& request, const Recording& recording, const std::vector<int>& cameras) {
+  const std::size_t count = recording.camera_count();
+  if (request.cameras.empty() || cameras.size() != count) return false;
+  const bool others = std::ranges::any_of(cameras, [&](int c) { return static_cast<std::size_t>(c) >= count; });
+  return request.topics.empty() ? count == 1 && recording.has_own_names() : others;
 }
 
 // The order of names tells nothing if they are not one for each camera.
@@ -39,11 +53,10 @@ Error unknown_order(const DatasetRequest& request, const Recording& recording, c
   for (std::size_t c = 0; c < recording.camera_count(); ++c) {
     if (const auto images = recording.images(c); !images) return images.error();  // may be those of several cameras
   }
-  const std::string file = request.rig_file ? request.rig_file->string() : "the calibration";
   return {request.path.string(), "", fmt::format("folders of images {}", fmt::join(folders, ", ")),
           fmt::format("those of the cameras of {} ({}): name the folders in their order with --topics, call them "
                       "like the cameras, or select cameras with --cameras",
-                      file, names_of(rig))};
+                      origin_of(request), names_of(rig))};
 }
 
 // Returns nullopt if the calibration of any camera cannot be read.
@@ -95,6 +108,10 @@ Result<RecordedCameras> recorded_cameras(const DatasetRequest& request, const Re
   const auto is_found = [](int folder) { return folder >= 0; };
   const std::vector<int> found = folders_by_name(folders, rig, cameras);
   if (!folders.empty() && std::ranges::all_of(found, is_found)) return RecordedCameras{found, true};
+  if (are_those_selected(request, recording, cameras)) {
+    all.resize(cameras.size());
+    return RecordedCameras{all, false};
+  }
   if (recording.has_own_names() && !folders.empty() &&
       (folders.size() != rig.size() || std::ranges::any_of(folders_by_name(folders, rig, all), is_found)))
     return unknown_order(request, recording, folders, rig);
@@ -103,23 +120,27 @@ Result<RecordedCameras> recorded_cameras(const DatasetRequest& request, const Re
     const std::size_t there = recording.camera_count();
     return Error{request.path.string(), "", fmt::format("images of {} camera{}", there, there == 1 ? "" : "s"),
                  fmt::format("images of camera {} as well, since {} has {} cameras; --cameras selects a subset", camera,
-                             request.rig_file->string(), rig.size())};
+                             origin_of(request), rig.size())};
   }
   return RecordedCameras{cameras, false};
 }
 
-Result<ChosenRig> choose_from_file(const DatasetRequest& request, const Recording& recording) {
-  const auto rig = rig_formats::read_rig(*request.rig_file);
+Result<ChosenRig> choose_given(const DatasetRequest& request, const Recording& recording) {
+  const auto rig = request.rig_file ? rig_formats::read_rig(*request.rig_file) : Result(*request.rig_of_map);
   if (!rig) return rig.error();
   const auto cameras = chosen_cameras(request.cameras, rig->size());
   if (!cameras) return cameras.error();
   const auto recorded = recorded_cameras(request, recording, *rig, *cameras);
   if (!recorded) return recorded.error();
+  if (!request.rig_file && !recorded->by_name && request.topics.empty() && recording.camera_count() != rig->size())
+    return Error{request.path.string(), "", fmt::format("images of {} cameras", recording.camera_count()),
+                 fmt::format("those of the map's cameras ({}): name them in this order with --topics, or give --rig",
+                             names_of(*rig))};
   ChosenRig chosen{*cameras, rig->subset(*cameras), *rig, {}, recorded->numbers, recorded->by_name};
   if (recording.camera_count() > rig->size()) {
     chosen.warnings.push_back(
         fmt::format("{} has {} cameras but the data set has {}; the additional cameras are not used",
-                    request.rig_file->string(), rig->size(), recording.camera_count()));
+                    origin_of(request), rig->size(), recording.camera_count()));
   }
   return chosen;
 }

@@ -32,13 +32,15 @@ struct RecordedCameras {
 };
 
 // Finds `cameras` of a rig in a recording: folders with the names of the cameras, or else the folders in their order.
+// If cameras are selected, a single folder or folders that are requested by name may be as many as these.
 // Errors: folders with names of their own of which only some are those of cameras, or which are not as many as the
 // rig has; images of too few cameras.
 Result<RecordedCameras> recorded_cameras(const DatasetRequest& request, const Recording& recording,
                                          const camera::Rig& rig, const std::vector<int>& cameras);
 
-// The calibration of the rig file that is requested. Errors: those of the file, and as above.
-Result<ChosenRig> choose_from_file(const DatasetRequest& request, const Recording& recording);
+// The calibration of the rig file that is requested, or else that of the map. Errors: those of the file, and as above;
+// more or fewer cameras than those of the map, whose order is then unknown.
+Result<ChosenRig> choose_given(const DatasetRequest& request, const Recording& recording);
 // The calibration that the recording contains.
 Result<ChosenRig> choose_own(const DatasetRequest& request, const Recording& recording);
 

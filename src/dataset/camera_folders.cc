@@ -80,6 +80,9 @@ Result<CameraFolders> requested_folders(const fs::path& data, const std::vector<
   for (const CameraFolder& folder : all_folders(data)) names.push_back(folder.name);
   for (const std::string& name : requested) {
     auto images = images_below(data / name);
+    if (!images && !image_files_of(data).empty())
+      return Error{"--topics", "", name,
+                   "no --topics, since " + data.string() + " has the images of one camera itself"};
     if (!images)
       return Error{"--topics", "", name,
                    fmt::format("folders with images in {}: {}", data.string(), fmt::join(names, ", "))};

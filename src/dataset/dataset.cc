@@ -16,6 +16,7 @@
 #include "dataset/mask_folder.h"
 #include "dataset/recording.h"
 #include "dataset/vignette_folder.h"
+#include "image/frame_grouping.h"
 #include "image_decoding/image_file.h"
 #include "rig_formats/rig_file.h"
 
@@ -40,7 +41,8 @@ Result<std::vector<std::vector<image_files::ImageFile>>> collect_images(const Da
   for (std::size_t i = 0; i < chosen.cameras.size(); ++i) {
     auto list = recording.images(static_cast<std::size_t>(chosen.recorded[i]));
     if (!list) return list.error();
-    chosen.warnings.insert(chosen.warnings.end(), list->warnings.begin(), list->warnings.end());
+    if (auto absent = absent_warning(list->images)) list->warnings.push_back(*std::move(absent));
+    for (const std::string& warning : list->warnings) add_once(warning, chosen.warnings);
     const camera::Camera& camera = chosen.rig.camera(i);
     if (const Status status = check_images(list->images, camera); !status) return status.error();
     if (const auto mask = image_decoding::read_mask(camera); !mask) return mask.error();
@@ -107,6 +109,26 @@ Status group(const DatasetRequest& request, const std::vector<std::vector<image_
   dataset.frames = std::move(grouping.frames);
   dataset.first_time_ns = dataset.frames.front().time_ns;
   return {};
+}
+
+// Warns if no camera has images for so long that the recording is probably two, or its clock was set.
+void warn_of_jumps(const fs::path& path, Dataset& dataset) {
+  constexpr TimeNs kLong_ns = 60'000'000'000;
+  constexpr TimeNs kIntervals = 20;
+  std::vector<TimeNs> times;
+  for (const FrameEntry& frame : dataset.frames) times.push_back(frame.time_ns);
+  if (times.size() < 3) return;
+  const TimeNs least_ns = std::max(kLong_ns, kIntervals * image::median_interval(times));
+  std::size_t jumps = 0, first = 0;
+  for (std::size_t k = 1; k < times.size(); ++k) {
+    if (times[k] - times[k - 1] > least_ns && jumps++ == 0) first = k;
+  }
+  if (jumps == 0) return;
+  dataset.warnings.push_back(fmt::format(
+      "{}: time stamps jump by {:.1f} s after {:.3f} s{}: two recordings in one, or a clock that was set (--begin and "
+      "--end select a part)",
+      path.string(), to_seconds(times[first] - times[first - 1]), to_seconds(times[first - 1] - dataset.first_time_ns),
+      jumps > 1 ? fmt::format(", and {} more times", jumps - 1) : ""));
 }
 
 Status check_request(const DatasetRequest& request) {
@@ -229,16 +251,22 @@ Status use_masks(const DatasetRequest& request, const Recording& recording, Chos
 
 }  // namespace
 
-Result<Dataset> open_dataset(const DatasetRequest& original) {
-  DatasetRequest request = original;
+Result<Dataset> open_dataset(const DatasetRequest& request) {
   if (const Status status = check_request(request); !status) return status.error();
   const auto opened = open_recording(request);
   if (!opened) return opened.error();
-  const Recording& recording = *opened->recording;
+  return dataset_of(request, *opened);
+}
+
+Result<Dataset> dataset_of(const DatasetRequest& original, const OpenRecording& opened) {
+  DatasetRequest request = original;
+  if (const Status status = check_request(request); !status) return status.error();
+  const Recording& recording = *opened.recording;
   const auto own_rig_file = request.rig_file ? std::nullopt : rig_file_in_folder(request);
   if (own_rig_file && !recording.calibrated()) request.rig_file = *own_rig_file;
-  if (const Status status = check_time_stamps(request, *opened); !status) return status.error();
-  auto chosen = request.rig_file ? choose_from_file(request, recording) : choose_own(request, recording);
+  if (const Status status = check_time_stamps(request, opened); !status) return status.error();
+  const bool given = request.rig_file || (request.rig_of_map && !recording.calibrated());
+  auto chosen = given ? choose_given(request, recording) : choose_own(request, recording);
   if (!chosen) return chosen.error();
   if (const Status s = use_masks(request, recording, *chosen); !s) return s.error();
   if (own_rig_file && !request.rig_file) {
@@ -250,7 +278,7 @@ Result<Dataset> open_dataset(const DatasetRequest& original) {
   const auto images = collect_images(request, recording, *chosen);
   if (!images) return images.error();
   Dataset dataset{name_of(request.path),
-                  opened->format,
+                  opened.format,
                   std::move(chosen->rig),
                   std::move(chosen->cameras),
                   std::move(chosen->whole),
@@ -266,6 +294,7 @@ Result<Dataset> open_dataset(const DatasetRequest& original) {
   if (const Status status = describe_pixels(request, *images, dataset); !status) return status.error();
   if (!request.rig_file) number_as_recorded(recording, dataset);
   if (const Status status = group(request, *images, dataset); !status) return status.error();
+  warn_of_jumps(request.path, dataset);
   if (const Status status = keep_range(request, dataset); !status) return status.error();
   return dataset;
 }

@@ -29,6 +29,8 @@ struct DatasetRequest {
   std::filesystem::path path;
   DatasetFormat format = DatasetFormat::kAuto;
   std::optional<std::filesystem::path> rig_file = {};  // default: the calibration in the data set
+  // Used if there is no other calibration: that of a map of the recording, which has the cameras of the run.
+  std::optional<camera::Rig> rig_of_map = {};
   // Of bags image topics, of the format kFolder sub-folders, in the order of the cameras; empty: all, by name.
   std::vector<std::string> topics = {};
   bool side_by_side = false;                       // of a video: each of its images is those of two cameras

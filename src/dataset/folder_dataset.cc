@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <map>
+#include <set>
 #include <utility>
 
 #include "dataset/camera_folders.h"
@@ -20,7 +20,8 @@ namespace fs = std::filesystem;
 // The images of a camera, with numbers or with times.
 struct CameraImages {
   image_files::ImageList list;
-  std::string times_from;  // what the times are from; empty: their unit is unknown
+  std::string times_from;  // what the times are from; empty: names
+  bool unit_is_known = false;
   std::string left_out = {};
   std::size_t left_out_count = 0;
 };
@@ -35,6 +36,7 @@ CameraImages from_names(NamedImages named, const fs::path& folder) {
   const auto unit = named.in_seconds ? image_files::StampUnit::kSeconds : image_files::StampUnit::kOfFile;
   return {.list = image_files::in_time_order(std::move(named.images), folder.string(), unit),
           .times_from = named.in_seconds ? "names, in seconds" : "",
+          .unit_is_known = named.in_seconds,
           .left_out = std::move(named.left_out),
           .left_out_count = named.left_out_count};
 }
@@ -57,18 +59,26 @@ Result<CameraImages> with_times(const TimeList& list, NamedImages named, const f
   return out;
 }
 
+// Returns true if a file that a list names, such as 000.png, front/000.png or front/data/000.png, may be in the folder
+// of a camera.
+bool may_be_in(const CameraFolder& camera, const fs::path& name) {
+  const fs::path parent = name.lexically_normal().parent_path(), below = parent.filename(),
+                 above = parent.parent_path().filename();
+  if (below.empty() || below == camera.name) return true;
+  return below == camera.images.filename() && (above.empty() || above == camera.name);
+}
+
 // Times of images that the list names. One list may name those of several folders.
 Result<CameraImages> with_named_times(const TimeList& list, const std::vector<fs::path>& files,
-                                      const fs::path& folder) {
-  std::map<std::string, bool> unused;  // by the name of the file: whether no time was found for it
-  for (const fs::path& file : files) unused[file.filename().string()] = true;
-  const std::string parent = folder.filename().string();
+                                      const CameraFolder& camera) {
+  const fs::path& folder = camera.images;
+  std::set<std::string> unlisted;
+  for (const fs::path& file : files) unlisted.insert(file.filename().string());
   std::vector<image_files::ImageFile> images;
   for (std::size_t k = 0; k < list.names.size(); ++k) {
     const fs::path name = list.names[k];
-    const std::string below = name.parent_path().filename().string();
-    if (!below.empty() && below != parent) continue;
-    if (const auto file = unused.find(name.filename().string()); file != unused.end()) file->second = false;
+    if (!may_be_in(camera, name)) continue;
+    unlisted.erase(name.filename().string());
     images.push_back({folder / name.filename(), list.times_ns[k]});
   }
   if (images.empty()) {
@@ -77,31 +87,50 @@ Result<CameraImages> with_named_times(const TimeList& list, const std::vector<fs
   }
   CameraImages out{.list = image_files::in_time_order(std::move(images), list.file.string(), unit_of(list)),
                    .times_from = list.file.filename().string()};
-  for (const auto& [file, is_unused] : unused) {
-    if (is_unused && out.left_out_count++ == 0) out.left_out = (folder / file).string();
+  if (!unlisted.empty()) {
+    out.list.warnings.push_back(fmt::format("{}: {} of {} images in {} are not listed and are not used, the first: {}",
+                                            list.file.string(), unlisted.size(), files.size(), folder.string(),
+                                            *unlisted.begin()));
   }
   return out;
 }
 
-// Returns the images of a folder. Numbers get their times from a list, if there is one and `lists` may be used.
-Result<CameraImages> read_camera(const CameraFolder& camera, const fs::path& data, bool lists) {
+// Images whose numbers are multiplied by the interval of a rate. A list of times is not used then.
+Result<CameraImages> at_rate(Result<NamedImages> named, const CameraFolder& camera, const fs::path& data) {
+  if (!named) return named.error();
+  CameraImages out = from_names(*std::move(named), camera.images);
+  const auto list = find_time_list(camera.images, data);
+  if (list && *list && !out.unit_is_known)
+    out.list.warnings.push_back((*list)->string() + ": not used, since --rate says when the images were taken");
+  return out;
+}
+
+// Returns the images of a folder. Numbers get their times from a list, if there is one.
+Result<CameraImages> read_camera(const CameraFolder& camera, const fs::path& data, const TimeStampOptions& stamps) {
   const std::vector<fs::path> files = image_files_of(camera.images);
   if (files.empty()) return Error{camera.images.string(), "", "no images", "images named by their time stamps in ns"};
   auto named = images_by_name(camera.images, files);
-  if (named && (named->in_seconds || !lists || are_nanoseconds(numbers_of(*named))))
+  if (stamps.rate_hz) return at_rate(std::move(named), camera, data);
+  if (named && (named->in_seconds || are_nanoseconds(numbers_of(*named))))
     return from_names(*std::move(named), camera.images);
-  const auto list = lists ? find_time_list(camera.images, data) : Result(std::optional<TimeList>());
+  const auto file = find_time_list(camera.images, data);
+  if (!file) return file.error();
+  if (!*file && !named) return named.error();
+  if (!*file) return from_names(*std::move(named), camera.images);
+  const auto list = read_time_list(**file, stamps.unit_ns.has_value());
   if (!list) return list.error();
-  if (*list && !(*list)->names.empty()) return with_named_times(**list, files, camera.images);
-  if (!named) return named.error();
-  return *list ? with_times(**list, *std::move(named), camera.images) : from_names(*std::move(named), camera.images);
+  if (list->names.empty() && !named) return named.error();
+  auto out = list->names.empty() ? with_times(*list, *std::move(named), camera.images)
+                                 : with_named_times(*list, files, camera);
+  if (out) out->unit_is_known = !stamps.unit_ns;
+  return out;
 }
 
 class FolderRecording : public Recording {
  public:
-  FolderRecording(fs::path data, CameraFolders folders, bool lists)
+  FolderRecording(fs::path data, CameraFolders folders, const TimeStampOptions& stamps)
       : data_(std::move(data)), folders_(std::move(folders)) {
-    for (const CameraFolder& folder : folders_.cameras) cameras_.push_back(read_camera(folder, data_, lists));
+    for (const CameraFolder& folder : folders_.cameras) cameras_.push_back(read_camera(folder, data_, stamps));
     warn_of_left_out();
   }
 
@@ -121,7 +150,7 @@ class FolderRecording : public Recording {
   }
 
   bool has_times() const override {
-    return std::ranges::any_of(cameras_, [](const auto& camera) { return camera && !camera->times_from.empty(); });
+    return std::ranges::any_of(cameras_, [](const auto& camera) { return camera && camera->unit_is_known; });
   }
   std::string stamps_from(std::size_t camera) const override {
     const bool known = cameras_[camera] && !cameras_[camera]->times_from.empty();
@@ -175,14 +204,15 @@ bool has_folders_of_images(const fs::path& folder) {
   return found && !found->cameras.empty();
 }
 
-RecordingResult open_folder(const fs::path& path, const std::vector<std::string>& names, bool lists) {
+RecordingResult open_folder(const fs::path& path, const std::vector<std::string>& names,
+                            const TimeStampOptions& stamps) {
   const fs::path folder = path.has_filename() ? path : path.parent_path();
   auto folders = find_camera_folders(folder, names);
   if (!folders) return folders.error();
   if (folders->cameras.empty())
     return Error{folder.string(), "", "no camera",
                  "cam0, cam1, ..., left and right, or other folders, with images named by their time stamps in ns"};
-  return std::unique_ptr<Recording>(std::make_unique<FolderRecording>(folder, *std::move(folders), lists));
+  return std::unique_ptr<Recording>(std::make_unique<FolderRecording>(folder, *std::move(folders), stamps));
 }
 
 }  // namespace bslam::dataset

@@ -3,8 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
+#include <map>
 #include <optional>
+#include <set>
 #include <system_error>
 
 #include "image_decoding/image_file.h"
@@ -79,10 +82,51 @@ bool have_same_images(FirstImages& a, FirstImages& b) {
   return equal >= kEqual;
 }
 
+// Names of the files in the folder of an image.
+class FolderContents {
+ public:
+  bool has(const std::filesystem::path& file) {
+    const std::filesystem::path folder = file.parent_path();
+    const auto [found, is_new] = names_.try_emplace(folder);
+    std::error_code error;
+    for (std::filesystem::directory_iterator it(folder, error), end; is_new && !error && it != end; it.increment(error))
+      found->second.insert(it->path().filename().string());
+    return found->second.contains(file.filename().string());
+  }
+
+ private:
+  std::map<std::filesystem::path, std::set<std::string>> names_;
+};
+
 }  // namespace
 
+void add_once(const std::string& warning, std::vector<std::string>& warnings) {
+  if (std::ranges::find(warnings, warning) == warnings.end()) warnings.push_back(warning);
+}
+
+std::string resolution_hint(int width, int height, const camera::Camera& camera) {
+  constexpr double kRounded = 1;  // pixels
+  const double factor = static_cast<double>(width) / camera.width;
+  if (width <= 0 || std::abs(height - factor * camera.height) > kRounded) return {};
+  const std::string part = factor == 0.5 ? "half" : factor == 2 ? "twice" : fmt::format("{:.3g} times", factor);
+  return fmt::format("; it looks like images of {} the resolution, for which its intrinsics must be scaled", part);
+}
+
+std::optional<std::string> absent_warning(const Images& images) {
+  FolderContents contents;
+  std::size_t absent = 0;
+  const image_files::ImageFile* first = nullptr;
+  for (const image_files::ImageFile& image : images) {
+    if (image.store || contents.has(image.path)) continue;
+    if (absent++ == 0) first = &image;
+  }
+  if (absent == 0 || absent == images.size()) return std::nullopt;
+  return fmt::format("{}: {} of {} listed images are not there, the first: {}", image_files::source_of(images.front()),
+                     absent, images.size(), image_files::name_of(*first));
+}
+
 Status check_images(const Images& images, const camera::Camera& camera) {
-  std::string found;
+  std::string found, hint;
   std::optional<Error> first_error;
   const std::vector<const image_files::ImageFile*> samples = samples_of(images);
   for (const image_files::ImageFile* file : samples) {
@@ -91,6 +135,7 @@ Status check_images(const Images& images, const camera::Camera& camera) {
     if (!image) continue;
     if (image->width() == camera.width && image->height() == camera.height) return {};
     found = fmt::format("{}x{} pixels", image->width(), image->height());
+    hint = resolution_hint(image->width(), image->height(), camera);
   }
   if (samples.empty()) {
     return Error{image_files::name_of(images.front()), camera.name,
@@ -101,7 +146,7 @@ Status check_images(const Images& images, const camera::Camera& camera) {
                  fmt::format("an image that can be read: none of {} that were tried can be", samples.size())};
   }
   return Error{image_files::source_of(images.front()), camera.name, "images of " + found,
-               fmt::format("{}x{}, the resolution of the calibration", camera.width, camera.height)};
+               fmt::format("{}x{}, the resolution of the calibration{}", camera.width, camera.height, hint)};
 }
 
 Status check_different_images(const std::vector<Images>& images) {

@@ -16,6 +16,16 @@ namespace bslam::dataset {
 // be read.
 Status check_images(const std::vector<image_files::ImageFile>& images, const camera::Camera& camera);
 
+// Adds a warning that is not there yet.
+void add_once(const std::string& warning, std::vector<std::string>& warnings);
+
+// For messages, if images have the shape but not the size of those that are calibrated: which part of the resolution
+// they have. Empty otherwise.
+std::string resolution_hint(int width, int height, const camera::Camera& camera);
+
+// Says how many images are listed but not there, and which is the first; nullopt if none are missing, or all.
+std::optional<std::string> absent_warning(const std::vector<image_files::ImageFile>& images);
+
 // Checks that no two cameras have the same images: several of their first ones in a row, except those of one value
 // everywhere, which may be equal by chance.
 Status check_different_images(const std::vector<std::vector<image_files::ImageFile>>& images);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <optional>
 #include <string_view>
@@ -12,6 +13,7 @@
 #include "base/lower_case.h"
 #include "base/number_text.h"
 #include "evaluation/trajectory_file.h"
+#include "image/frame_grouping.h"
 
 namespace bslam::dataset {
 namespace {
@@ -113,16 +115,61 @@ std::optional<std::size_t> decimal_seconds(const Group& group, const std::vector
   return std::nullopt;
 }
 
-// Some programs write seconds, a point and nanoseconds without their leading zeros.
-Status check_fractions(const fs::path& folder, const Group& group, std::size_t fraction) {
-  constexpr std::size_t kNanoseconds = 9;
-  const auto length = [&](const SplitName& name) { return name.numbers[fraction].size(); };
-  const auto [least, most] = std::ranges::minmax_element(group, {}, length);
-  if (length(*least) == length(*most) || length(*most) != kNanoseconds) return {};
+// Some programs write decimals without the zeros behind them, others a whole number of nanoseconds, microseconds or
+// milliseconds without the zeros before it.
+enum class Fraction { kDecimal, kUnpadded };
+
+std::optional<TimeNs> seconds_of(const SplitName& name, std::size_t seconds, Fraction fraction,
+                                 std::size_t most_digits) {
+  std::string digits = name.numbers[seconds + 1];
+  if (fraction == Fraction::kUnpadded) digits.insert(0, most_digits - digits.size(), '0');
+  return evaluation::parse_seconds(name.numbers[seconds] + "." + digits);
+}
+
+// How far the intervals between images are from being equal: the sum of their differences from the median, over the
+// median.
+double irregularity(const Group& group, std::size_t seconds, Fraction fraction, std::size_t most_digits) {
+  std::vector<TimeNs> times;
+  for (const SplitName& name : group) {
+    if (const auto time = seconds_of(name, seconds, fraction, most_digits)) times.push_back(*time);
+  }
+  std::ranges::sort(times);
+  const auto median = static_cast<double>(image::median_interval(times));
+  double sum = 0;
+  for (std::size_t k = 1; k < times.size(); ++k) sum += std::abs(static_cast<double>(times[k] - times[k - 1]) - median);
+  return sum / std::max(median, 1.0);
+}
+
+// Returns what the digits behind the point are, if they are not as many in all names. A shorter number that ends in 0
+// is no decimal without its zeros, and one that begins with 0 has been padded.
+Result<Fraction> fraction_of(const fs::path& folder, const Group& group, std::size_t seconds) {
+  constexpr double kClearly = 3;
+  const auto digits = [&](const SplitName& name) -> const std::string& { return name.numbers[seconds + 1]; };
+  const auto [least, most] =
+      std::ranges::minmax_element(group, {}, [&](const SplitName& name) { return digits(name).size(); });
+  const std::size_t longest = digits(*most).size();
+  if (digits(*least).size() == longest) return Fraction::kDecimal;
+  const auto ends_early = [&](const SplitName& name) {
+    return digits(name).size() > 1 && digits(name).size() < longest && digits(name).ends_with('0');
+  };
+  const auto is_padded = [&](const SplitName& name) {
+    return digits(name).size() > 1 && digits(name).starts_with('0');
+  };
+  const bool may_be_decimal = std::ranges::none_of(group, ends_early);
+  const bool is_unit = longest == 3 || longest == 6 || longest == 9;
+  const bool may_be_unpadded = is_unit && std::ranges::none_of(group, is_padded);
+  if (may_be_decimal && !may_be_unpadded) return Fraction::kDecimal;
+  if (may_be_unpadded && !may_be_decimal) return Fraction::kUnpadded;
+  if (may_be_decimal) {
+    const double decimal = irregularity(group, seconds, Fraction::kDecimal, longest),
+                 unpadded = irregularity(group, seconds, Fraction::kUnpadded, longest);
+    if (decimal > kClearly * unpadded) return Fraction::kUnpadded;
+    if (unpadded > kClearly * decimal) return Fraction::kDecimal;
+  }
   return Error{folder.string(), "",
-               fmt::format("seconds with {} and with {} digits behind the point ({}, {})", length(*least),
-                           length(*most), least->file.filename().string(), most->file.filename().string()),
-               "as many digits in all names: these are decimals, or nanoseconds without their zeros"};
+               fmt::format("seconds with {} and with {} digits behind the point ({}, {})", digits(*least).size(),
+                           longest, least->file.filename().string(), most->file.filename().string()),
+               "as many digits in all names: these are decimals, or whole numbers without their zeros"};
 }
 
 std::string example_names(const Group& group) {
@@ -137,18 +184,26 @@ Result<NamedImages> read_names(const fs::path& folder, const Group& group) {
     return Error{folder.string(), "", "names in which several numbers differ, such as " + example_names(group),
                  "names that differ in one number, or times.txt with lines of TIME FILENAME"};
   }
+  Fraction fraction = Fraction::kDecimal;
+  std::size_t most_digits = 0;
   if (seconds) {
-    if (const Status s = check_fractions(folder, group, *seconds + 1); !s) return s.error();
+    const auto found = fraction_of(folder, group, *seconds);
+    if (!found) return found.error();
+    fraction = *found;
+    for (const SplitName& name : group) most_digits = std::max(most_digits, name.numbers[*seconds + 1].size());
   }
   out.in_seconds = seconds.has_value();
   for (const SplitName& name : group) {
-    const auto time = seconds ? evaluation::parse_seconds(name.numbers[*seconds] + "." + name.numbers[*seconds + 1])
-                              : parse_integer(name.numbers[varying.front()]);
-    if (time) {
-      out.images.push_back({name.file, *time});
-    } else if (out.left_out_count++ == 0) {
-      out.left_out = name.file.string();
+    if (seconds) {
+      if (const auto time = seconds_of(name, *seconds, fraction, most_digits)) {
+        out.images.push_back({name.file, *time});
+        continue;
+      }
+    } else if (const auto number = parse_integer(name.numbers[varying.front()])) {
+      out.images.push_back({name.file, *number});
+      continue;
     }
+    if (out.left_out_count++ == 0) out.left_out = name.file.string();
   }
   if (out.images.empty())
     return Error{folder.string(), "", "names such as " + group.front().file.filename().string(),

@@ -27,7 +27,9 @@ struct NamedImages {
 
 // Reads the numbers of the names: all digits, or those digits that differ between the names, which have the same text
 // before and behind them. Two of them with a point between are decimal seconds. Files with other names are left out if
-// they are single ones, or if others have names of digits only. Errors: no images; names of several kinds; names in
+// they are single ones, or if others have names of digits only. Digits behind the point that are not as many in all
+// names are decimals without zeros at their ends, or whole numbers of ns, us or ms without zeros at their beginnings,
+// whichever is possible or gives nearly equal intervals. Errors: no images; names of several kinds; names in
 // which several numbers differ; fractions of a second of which it cannot be told what they are.
 Result<NamedImages> images_by_name(const std::filesystem::path& folder,
                                    const std::vector<std::filesystem::path>& files);

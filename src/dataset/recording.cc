@@ -87,10 +87,9 @@ Result<OpenRecording> open_recording(const DatasetRequest& request) {
   const auto format = format_of(request, files);
   if (!format) return format.error();
   if (const Status s = check_bag_options(request, *format); !s) return s.error();
-  const bool lists = !request.time_stamps.rate_hz && !request.time_stamps.unit_ns;
   auto recording = *format == DatasetFormat::kEuroc    ? open_euroc(files.front())
                    : *format == DatasetFormat::kKitti  ? open_kitti_of_any_kind(files.front())
-                   : *format == DatasetFormat::kFolder ? open_folder(files.front(), request.topics, lists)
+                   : *format == DatasetFormat::kFolder ? open_folder(files.front(), request.topics, request.time_stamps)
                    : *format == DatasetFormat::kBag    ? open_bag(files, request.topics)
                                                        : open_video(files, request.side_by_side);
   if (!recording) return recording.error();

@@ -56,13 +56,17 @@ struct OpenRecording {
 };
 Result<OpenRecording> open_recording(const DatasetRequest& request);
 
+// The data set of a recording that is open, as open_dataset returns it.
+Result<Dataset> dataset_of(const DatasetRequest& request, const OpenRecording& opened);
+
 // Each function returns an Error that names the expected files if `folder` does not have its format.
 RecordingResult open_euroc(const std::filesystem::path& folder);      // mav0/camN/data.csv
 RecordingResult open_kitti(const std::filesystem::path& folder);      // image_N/NNNNNN.png and times.txt
 RecordingResult open_kitti_raw(const std::filesystem::path& folder);  // image_NN/data/*.png and timestamps.txt
-// A folder of images for each camera: `names`, or all if that is empty. `lists`: numbers in names of images get their
-// times from times.txt and the like (dataset/time_list.h), if there is one.
-RecordingResult open_folder(const std::filesystem::path& path, const std::vector<std::string>& names, bool lists);
+// A folder of images for each camera: `names`, or all if that is empty. Numbers in names of images get their times from
+// times.txt and the like (dataset/time_list.h), if there is one and no rate is given.
+RecordingResult open_folder(const std::filesystem::path& path, const std::vector<std::string>& names,
+                            const TimeStampOptions& stamps);
 // Videos: one per camera, or one with the images of two cameras side by side. Their first images were taken together.
 RecordingResult open_video(const std::vector<std::filesystem::path>& files, bool side_by_side);
 

@@ -12,6 +12,7 @@
 #include "dataset/camera_choice.h"
 #include "dataset/image_checks.h"
 #include "dataset/recording.h"
+#include "image/frame_grouping.h"
 #include "rig_formats/rig_file.h"
 
 namespace bslam::dataset {
@@ -64,15 +65,16 @@ std::vector<std::string> missing_for(const DatasetRequest& request, const Record
                       rig->size(), request.rig_file->string(), rig->size(), recording.camera_count()));
     }
     for (const StreamDescription& s : streams) {
-      const auto c = static_cast<std::size_t>(s.camera);  // of the recording
+      const auto c = static_cast<std::size_t>(s.camera);  // of the run
       const std::size_t of_rig = request.cameras.empty()      ? c
                                  : c < request.cameras.size() ? static_cast<std::size_t>(request.cameras[c])
                                                               : rig->size();
       if (s.camera < 0 || s.width == 0 || of_rig >= rig->size()) continue;
       const camera::Camera& camera = rig->camera(of_rig);
       if (camera.width == s.width && camera.height == s.height) continue;
-      missing.push_back(fmt::format("the calibration of {} x {} pixels: {} is calibrated for {} x {} in {}", s.width,
-                                    s.height, camera.name, camera.width, camera.height, request.rig_file->string()));
+      missing.push_back(fmt::format("the calibration of {} x {} pixels: {} is calibrated for {} x {} in {}{}", s.width,
+                                    s.height, camera.name, camera.width, camera.height, request.rig_file->string(),
+                                    resolution_hint(s.width, s.height, camera)));
     }
     return missing;
   }
@@ -85,48 +87,96 @@ std::vector<std::string> missing_for(const DatasetRequest& request, const Record
   return missing;
 }
 
-// Decodes a few images of every camera, and adds what is wrong with their time stamps.
+std::string unit_text(const TimeStampOptions& options) {
+  if (options.rate_hz) return fmt::format(", {:g} images per second", *options.rate_hz);
+  return options.unit_ns ? fmt::format(", in units of {:g} s", to_seconds(*options.unit_ns)) : "";
+}
+
+// Counts the images that are missing between others, and says where the first one is.
+std::optional<std::string> gaps_note(const std::vector<TimeNs>& times) {
+  if (times.size() < 3) return std::nullopt;
+  const auto interval_ns = static_cast<double>(image::median_interval(times));
+  constexpr double kMostlyRegular = 0.7;
+  double missing = 0, regular = 0;
+  std::size_t first = 0;
+  for (std::size_t k = 1; k < times.size() && interval_ns > 0; ++k) {
+    const double steps = std::round(static_cast<double>(times[k] - times[k - 1]) / interval_ns);
+    if (steps > 1 && missing == 0) first = k;
+    missing += std::max(0.0, steps - 1);
+    regular += steps == 1;
+  }
+  if (missing == 0 || regular < kMostlyRegular * static_cast<double>(times.size() - 1)) return std::nullopt;
+  return fmt::format("{:.0f} image{} missing at {:.1f} Hz, the first after {:.3f} s of it", missing,
+                     missing == 1 ? " is" : "s are", 1e9 / interval_ns, to_seconds(times[first - 1] - times.front()));
+}
+
+// Decodes a few images of every camera, converts its time stamps as requested, and adds what is wrong with them.
 void try_images(const DatasetRequest& request, const Recording& recording, RecordingDescription& out) {
   std::vector<std::vector<image_files::ImageFile>> images;
+  const TimeStampOptions stamps = recording.has_times() ? TimeStampOptions() : request.time_stamps;
   for (StreamDescription& stream : out.streams) {
     if (stream.camera < 0) continue;
     auto list = recording.images(static_cast<std::size_t>(stream.camera));
     if (!list) continue;
-    for (const std::string& warning : list->warnings) {
-      if (std::ranges::find(out.warnings, warning) == out.warnings.end()) out.warnings.push_back(warning);
-    }
+    if (auto absent = absent_warning(list->images)) list->warnings.push_back(*std::move(absent));
+    for (const std::string& warning : list->warnings) add_once(warning, out.warnings);
     if (auto note = unreadable_note(list->images)) {
       if (stream.width == 0) out.missing.push_back(stream.name + ": images that can be read");
       stream.notes.push_back(*std::move(note));
     }
     const std::string source = image_files::source_of(list->images.front());
-    if (const Status s = convert_time_stamps(request.time_stamps, source, list->images); !s)
+    if (const Status s = convert_time_stamps(stamps, source, list->images); s) {
+      stream.times.clear();
+      for (const image_files::ImageFile& image : list->images) stream.times.push_back(image.time_ns);
+      stream.stamps += unit_text(stamps);
+      if (auto note = gaps_note(stream.times)) stream.notes.push_back(*std::move(note));
+    } else {
       out.missing.push_back(s.error().message());
+    }
     images.push_back(std::move(list->images));
   }
   if (const Status s = check_different_images(images); !s) out.missing.push_back(s.error().message());
 }
 
-// Gives the cameras of a recording their numbers in the rig file, if they are found by its names.
-void number_by_names(const DatasetRequest& request, const Recording& recording, RecordingDescription& out) {
+// Returns the number in the recording of each camera of the run; nullopt if it cannot be told.
+std::optional<std::vector<int>> cameras_of_run(const DatasetRequest& request, const Recording& recording,
+                                               RecordingDescription& out) {
   DatasetRequest with_rig = request;
   if (!with_rig.rig_file && !recording.calibrated()) with_rig.rig_file = rig_file_in_folder(request);
-  if (!with_rig.rig_file) return;
+  if (!with_rig.rig_file) {
+    const auto cameras = chosen_cameras(request.cameras, recording.camera_count());
+    return cameras ? std::optional(*cameras) : std::nullopt;
+  }
   const auto rig = rig_formats::read_rig(*with_rig.rig_file);
-  if (!rig) return;
+  if (!rig) return std::nullopt;
   const auto cameras = chosen_cameras(request.cameras, rig->size());
-  if (!cameras) return;
+  if (!cameras) return std::nullopt;
   const auto recorded = recorded_cameras(with_rig, recording, *rig, *cameras);
-  if (!recorded) {
-    if (recording.has_own_names()) out.missing.push_back(recorded.error().message());
+  if (recorded) return recorded->numbers;
+  if (recording.has_own_names()) out.missing.push_back(recorded.error().message());
+  return std::nullopt;
+}
+
+// Gives the streams the numbers of the cameras of the run.
+void number_cameras(const DatasetRequest& request, const Recording& recording, RecordingDescription& out) {
+  const auto cameras = cameras_of_run(request, recording, out);
+  if (!cameras) return;
+  for (StreamDescription& stream : out.streams) {
+    if (stream.camera < 0) continue;
+    const auto place = std::ranges::find(*cameras, stream.camera);
+    stream.camera = place == cameras->end() ? -1 : static_cast<int>(place - cameras->begin());
+  }
+}
+
+// Opens the recording as `run` does: nothing else is missing for it, or it says what is.
+void try_to_open(const DatasetRequest& request, const OpenRecording& opened, RecordingDescription& out) {
+  const auto dataset = dataset_of(request, opened);
+  if (!dataset) {
+    out.refusal = dataset.error().message();
     return;
   }
-  if (!recorded->by_name) return;
-  for (StreamDescription& stream : out.streams) {
-    const auto place = std::ranges::find(recorded->numbers, stream.camera);
-    if (stream.camera < 0) continue;
-    stream.camera = place == recorded->numbers.end() ? -1 : static_cast<int>(place - recorded->numbers.begin());
-  }
+  out.missing.clear();
+  for (const std::string& warning : dataset->warnings) add_once(warning, out.warnings);
 }
 
 }  // namespace
@@ -139,10 +189,11 @@ Result<RecordingDescription> describe_recording(const DatasetRequest& request) {
   const std::vector<std::string> damage = opened->recording->warnings();
   out.warnings.insert(out.warnings.begin(), damage.begin(), damage.end());
   try_images(request, *opened->recording, out);
-  number_by_names(request, *opened->recording, out);
+  number_cameras(request, *opened->recording, out);
   const std::vector<std::string> missing = missing_for(request, *opened->recording, out.streams);
   out.missing.insert(out.missing.end(), missing.begin(), missing.end());
   out.synchrony = synchrony(out.streams, request.sync_tolerance_s);
+  try_to_open(request, *opened, out);
   return out;
 }
 

@@ -27,7 +27,7 @@ struct StreamDescription {
   std::vector<TimeNs> times = {};  // of all images in increasing order; of other messages the first and the last
   std::string stamps = {};         // where the times are from, such as "header"
   std::optional<LagDescription> lag = {};
-  int camera = -1;          // which camera it would be; -1: none
+  int camera = -1;          // which camera of the run it would be; -1: none
   bool calibrated = false;  // the recording has intrinsics of it
   std::string unused = {};  // why it would not be used, if it has images
   std::vector<std::string> notes = {};
@@ -46,7 +46,8 @@ struct RecordingDescription {
   std::vector<StreamDescription> streams;
   bool proposed = true;  // which stream is which camera was not requested
   std::vector<std::string> warnings = {};
-  std::vector<std::string> missing = {};             // what `run` needs beside the recording
+  std::vector<std::string> missing = {};  // what `run` needs beside the recording; empty if it would run
+  std::string refusal = {};  // the error with which `run` would refuse the recording; empty if it would run
   std::vector<SynchronyDescription> synchrony = {};  // of all cameras except 0
 };
 

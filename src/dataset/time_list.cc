@@ -76,8 +76,8 @@ Status check_interval(const TimeList& list, bool whole) {
   return Error{list.file.string(), "",
                whole ? fmt::format("whole numbers {} apart", interval_ns)
                      : fmt::format("times {:g} s apart", to_seconds(interval_ns)),
-               "seconds with a decimal point, or whole nanoseconds; --rate HZ and --stamp-unit UNIT use the numbers in "
-               "the names of the images instead"};
+               "seconds with a decimal point, or whole nanoseconds; --stamp-unit UNIT says what whole numbers are, and "
+               "--rate HZ uses the numbers in the names of the images instead"};
 }
 
 // Returns which of the files exist in the folder.
@@ -92,23 +92,25 @@ std::vector<fs::path> existing(const fs::path& folder, const std::vector<std::st
 
 }  // namespace
 
-Result<TimeList> read_time_list(const fs::path& file) {
+Result<TimeList> read_time_list(const fs::path& file, bool unit_is_given) {
   const auto lines = read_lines(file);
   if (!lines) return lines.error();
   TimeList list{.file = file, .times_ns = {}, .names = {}};
   const bool whole = std::ranges::all_of(*lines, is_whole);
   list.in_seconds = !whole;
+  if (unit_is_given && !whole)
+    return Error{file.string(), "", "times with a decimal point, which are seconds", "whole numbers with --stamp-unit"};
   for (const Line& line : *lines) {
     const auto time = whole ? parse_integer(line.time) : evaluation::parse_seconds(line.time);
     if (!time || *time < 0 || *time > kMaxTime) return line_error(file, line);
     list.times_ns.push_back(*time);
     if (!line.name.empty()) list.names.push_back(line.name);
   }
-  if (const Status s = check_interval(list, whole); !s) return s.error();
+  if (const Status s = unit_is_given ? Status() : check_interval(list, whole); !s) return s.error();
   return list;
 }
 
-Result<std::optional<TimeList>> find_time_list(const fs::path& folder, const fs::path& data) {
+Result<std::optional<fs::path>> find_time_list(const fs::path& folder, const fs::path& data) {
   const bool deeper = folder != data && folder.parent_path() != data;
   const std::string name = (deeper ? folder.parent_path() : folder).filename().string();
   const std::vector<std::string> usual = {"times.txt", "timestamps.txt", "times.csv", "timestamps.csv"};
@@ -129,11 +131,9 @@ Result<std::optional<TimeList>> find_time_list(const fs::path& folder, const fs:
                    fmt::format("{} and {}", files[0].filename().string(), files[1].filename().string()),
                    "one file with the times of the images"};
     }
-    auto list = read_time_list(files.front());
-    if (!list) return list.error();
-    return std::optional(*std::move(list));
+    return std::optional(files.front());
   }
-  return std::optional<TimeList>();
+  return std::optional<fs::path>();
 }
 
 }  // namespace bslam::dataset

@@ -106,6 +106,14 @@ std::string seconds_text(TimeNs duration_ns) {
   return text;
 }
 
+std::string range_text(const Trajectory& trajectory) {
+  if (trajectory.empty()) return "empty";
+  char text[80];
+  std::snprintf(text, sizeof text, "from %.3f to %.3f s", to_seconds(trajectory.front().time_ns),
+                to_seconds(trajectory.back().time_ns));
+  return text;
+}
+
 }  // namespace
 
 ErrorStatistics statistics_of(std::vector<double> errors) {
@@ -151,7 +159,8 @@ Result<TrajectoryEvaluation> evaluate(const Trajectory& estimate, const Trajecto
                  .key = {},
                  .found = std::to_string(pairs.size()) + " poses within " + seconds_text(options.max_dt_ns) +
                           " of a ground-truth pose",
-                 .expected = "at least " + std::to_string(kMinPairs)};
+                 .expected = "at least " + std::to_string(kMinPairs) + "; the estimate is " + range_text(estimate) +
+                             ", the ground truth " + range_text(ground_truth)};
   }
   TrajectoryEvaluation result;
   const std::optional<Sim3> similarity = fit(estimate, ground_truth, pairs, geometry::ScaleMode::kFree);

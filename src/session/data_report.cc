@@ -131,6 +131,8 @@ std::string as_text(const std::string& path, const RecordingDescription& recordi
   text += used_text(recording);
   for (const std::string& missing : recording.missing) text += "missing for bslam run: " + missing + "\n";
   for (const std::string& warning : recording.warnings) text += "warning: " + warning + "\n";
+  if (!recording.refusal.empty() && std::ranges::count(recording.missing, recording.refusal) == 0)
+    text += "refused by bslam run: " + recording.refusal + "\n";
   return text;
 }
 
@@ -169,16 +171,18 @@ std::string as_json(const std::string& path, const RecordingDescription& recordi
                      {"streams", std::move(streams)},
                      {"synchrony", std::move(synchrony)},
                      {"missing", recording.missing},
+                     {"refused", recording.refusal.empty() ? Json() : Json(recording.refusal)},
                      {"warnings", recording.warnings}};
   return json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace
 
-Result<std::string> report_data(const dataset::DatasetRequest& request, bool json) {
+Result<DataReport> report_data(const dataset::DatasetRequest& request, bool json) {
   const auto recording = dataset::describe_recording(request);
   if (!recording) return recording.error();
-  return json ? as_json(request.path.string(), *recording) : as_text(request.path.string(), *recording);
+  const std::string path = request.path.string();
+  return DataReport{json ? as_json(path, *recording) : as_text(path, *recording), recording->refusal.empty()};
 }
 
 }  // namespace bslam::session

@@ -8,9 +8,14 @@
 
 namespace bslam::session {
 
+struct DataReport {
+  std::string text;   // or JSON
+  bool runs = false;  // `run` would not refuse the recording
+};
+
 // Returns text or JSON for stdout: format, duration, and for every topic, folder or video its type, images and times;
 // which camera it would be; whether the cameras are synchronous; what is missing for a run. Errors: those of
 // describe_recording.
-Result<std::string> report_data(const dataset::DatasetRequest& request, bool json);
+Result<DataReport> report_data(const dataset::DatasetRequest& request, bool json);
 
 }  // namespace bslam::session

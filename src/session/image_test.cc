@@ -19,6 +19,20 @@ Result<std::vector<calibration::PairEvidence>> test_against_images(const dataset
   return calibration::check_conventions(dataset.rig, frames, *masks);
 }
 
+std::optional<calibration::LateCamera> late_camera(const dataset::Dataset& dataset) {
+  constexpr std::size_t kTriples = 6;
+  const auto masks = image_decoding::read_masks(dataset.rig);
+  const std::size_t size = dataset.frames.size();
+  if (!masks || dataset.rig.size() < 2 || size < 3) return std::nullopt;
+  const std::size_t count = std::min(kTriples, size / 3);
+  std::vector<calibration::FrameTriple> triples(count);
+  for (std::size_t t = 0; t < count; ++t) {
+    const std::size_t first = (2 * t + 1) * (size - 2) / (2 * count);
+    for (std::size_t f = 0; f < 3; ++f) triples[t][f] = dataset::read_frame(dataset, first + f);
+  }
+  return calibration::find_late_camera(dataset.rig, triples, *masks);
+}
+
 std::vector<calibration::CameraPair> contradicted_pairs(const dataset::Dataset& dataset) {
   std::vector<calibration::CameraPair> out;
   const auto tested = test_against_images(dataset);

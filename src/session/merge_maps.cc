@@ -64,14 +64,18 @@ std::string reason_of(const looping::JoinAttempts& attempts, const looping::Loop
 struct Inputs {
   map::BundledMap map;                             // of all of them
   std::vector<std::vector<KeyframeId>> keyframes;  // of each
+  std::vector<MapPart> parts;                      // each
 };
 
 Result<Inputs> append_all(const std::vector<SavedMap>& maps) {
-  Inputs out{maps.front().map, {maps.front().map.keyframe_ids()}};
+  std::vector<LandmarkId> same;
+  for (std::size_t l = 0; l < maps.front().map.landmark_slots(); ++l) same.emplace_back(l);
+  Inputs out{maps.front().map, {maps.front().map.keyframe_ids()}, {{&maps.front().map, std::move(same)}}};
   for (std::size_t i = 1; i < maps.size(); ++i) {
-    std::vector<KeyframeId> ids = map::append_map(out.map, maps[i].map).keyframes;
-    std::erase_if(ids, [](KeyframeId k) { return !k.valid(); });
-    out.keyframes.push_back(std::move(ids));
+    map::AppendedIds ids = map::append_map(out.map, maps[i].map);
+    std::erase_if(ids.keyframes, [](KeyframeId k) { return !k.valid(); });
+    out.keyframes.push_back(std::move(ids.keyframes));
+    out.parts.push_back({&maps[i].map, std::move(ids.landmarks)});
     if (out.map.rig().size() > storage::kMaxCameras)
       return Error{maps[i].file, "rig", fmt::format("{} cameras with those of the other maps", out.map.rig().size()),
                    fmt::format("at most {}; maps with fewer rigs", storage::kMaxCameras)};
@@ -148,6 +152,7 @@ Result<MergeResult> merge_maps(std::vector<SavedMap> maps, const place::Vocabula
     result.inputs.push_back({maps[i].file, maps[i].info.data, inputs->keyframes[i].size(), submaps[i],
                              joined ? "" : reason_of(attempts[i], config.looping)});
   }
+  result.scales = compare_scales(result.map, inputs->parts);
   return result;
 }
 

@@ -7,6 +7,7 @@
 
 #include "map/bundled_map.h"
 #include "place/vocabulary.h"
+#include "session/map_scales.h"
 #include "storage/map_file.h"
 #include "system/config.h"
 
@@ -25,6 +26,7 @@ struct MergeResult {
   std::vector<MergedInput> inputs;  // the map with the most keyframes first; the order depends on contents only
   int joined = 0;                   // submaps that were merged into others
   int loops = 0;                    // further loop closures
+  std::vector<ScaleComparison> scales = {};  // of pairs of inputs that have landmarks in common
 };
 
 // Appends all maps to the one with the most keyframes, whose world frame is kept, and searches a loop closure for every

@@ -81,6 +81,12 @@ bool single_camera_agrees(const RunRecord& record) {
   return used > 1 && contradicted + 1 >= used;
 }
 
+// Whether anything speaks against the calibration or the time stamps.
+bool is_contradicted(const CalibrationRecord& calibration) {
+  return !calibration.pairs.empty() || !calibration.disagreeing.empty() ||
+         calibration.estimate.verdict == calibration::Verdict::kInconsistent;
+}
+
 void add_calibration(const RecordInput& input, RunRecord& record) {
   CalibrationRecord& calibration = record.calibration;
   calibration.estimate = input.system.calibration();
@@ -96,6 +102,7 @@ void add_calibration(const RecordInput& input, RunRecord& record) {
   for (std::size_t c = 0; c < record.cameras.size(); ++c) {
     if (inconsistent_fraction(record.cameras[c]) > 0.5) calibration.disagreeing.push_back(c);
   }
+  if (input.complete && is_contradicted(calibration)) calibration.late = late_camera(input.dataset);
   calibration.accept_estimate(input.complete, input.system.calibration_refined());
   for (CameraRecord& camera : record.cameras) {
     if (camera.extrinsics) camera.extrinsics->refined = calibration.refined;

@@ -54,6 +54,7 @@ Json evidence_json(const std::vector<PairEvidence>& evidence) {
   for (const PairEvidence& pair : evidence) {
     pairs.push_back({{"cameras", {pair.first, pair.second}},
                      {"matches", pair.matches},
+                     {"mirrored", pair.mirrored ? Json(pair.mirrored->camera) : Json()},
                      {"fit_as_given", pair.agreeing[0]},
                      {"fit_inverted", pair.agreeing[1]},
                      {"fit_pair_inverted", pair.agreeing[2]},
@@ -110,7 +111,23 @@ Result<Calibration> read_calibration(const RigReportRequest& request) {
   return Calibration{*std::move(file), std::move(format)};
 }
 
-std::string as_json(const Calibration& calibration, const std::optional<std::vector<PairEvidence>>& evidence) {
+// What the images of a recording show.
+struct ImageEvidence {
+  std::vector<PairEvidence> pairs;
+  std::optional<calibration::LateCamera> late;
+};
+
+Json late_json(const calibration::LateCamera& late) {
+  return {{"camera", late.camera},
+          {"reference", late.reference},
+          {"early", late.early},
+          {"matches", late.matches},
+          {"fit", late.agreeing},
+          {"matches_one_frame_apart", late.matches_apart},
+          {"fit_one_frame_apart", late.agreeing_apart}};
+}
+
+std::string as_json(const Calibration& calibration, const std::optional<ImageEvidence>& evidence) {
   const rig_formats::RigFile& file = calibration.file;
   const camera::Rig& rig = file.rig;
   Json cameras = Json::array(), baselines = Json::array();
@@ -127,20 +144,28 @@ std::string as_json(const Calibration& calibration, const std::optional<std::vec
                {"baselines", std::move(baselines)},
                {"notes", file.notes},
                {"warnings", warnings_of(rig)}};
-  if (evidence) json["images"] = evidence_json(*evidence);
+  if (evidence) json["images"] = evidence_json(evidence->pairs);
+  if (evidence) json["late_camera"] = evidence->late ? late_json(*evidence->late) : Json();
   return json.dump(1) + "\n";
 }
 
-std::string as_text(const Calibration& calibration, const std::optional<std::vector<PairEvidence>>& evidence) {
+std::string as_text(const Calibration& calibration, const std::optional<ImageEvidence>& evidence) {
   const rig_formats::RigFile& file = calibration.file;
   std::string text = fmt::format("format: {}\n", calibration.format) + calibration::describe_rig(file.rig);
   for (const std::string& note : file.notes) text += "note: " + note + "\n";
   for (const std::string& warning : warnings_of(file.rig)) text += "warning: " + warning + "\n";
-  return evidence ? text + calibration::describe_evidence(*evidence) : text;
+  if (!evidence) return text;
+  if (const auto& late = evidence->late) {
+    text += "warning: " +
+            calibration::describe_late_camera(*late, file.rig.camera(late->camera).name,
+                                              file.rig.camera(late->reference).name) +
+            "\n";
+  }
+  return text + calibration::describe_evidence(evidence->pairs);
 }
 
 // Tests the calibration against the images of a recording.
-Result<std::vector<PairEvidence>> check_against_images(const RigReportRequest& request, bool own_calibration) {
+Result<ImageEvidence> check_against_images(const RigReportRequest& request, bool own_calibration) {
   constexpr double kTolerance_s = 0.1;  // wide enough to group the images of cameras that capture late
   dataset::DatasetRequest recording = request.recording;
   recording.path = request.images;
@@ -148,7 +173,9 @@ Result<std::vector<PairEvidence>> check_against_images(const RigReportRequest& r
   recording.sync_tolerance_s = kTolerance_s;
   const auto dataset = dataset::open_dataset(recording);
   if (!dataset) return dataset.error();
-  return test_against_images(*dataset);
+  auto pairs = test_against_images(*dataset);
+  if (!pairs) return pairs.error();
+  return ImageEvidence{*std::move(pairs), late_camera(*dataset)};
 }
 
 }  // namespace
@@ -160,7 +187,7 @@ Result<std::string> report_rig(const RigReportRequest& request) {
     const Status written = write_atomically(request.svg, report::rig_plot_svg(calibration->file.rig));
     if (!written) return written.error();
   }
-  std::optional<std::vector<PairEvidence>> evidence;
+  std::optional<ImageEvidence> evidence;
   if (!request.images.empty()) {
     auto checked = check_against_images(request, calibration->of_recording);
     if (!checked) return checked.error();

@@ -12,6 +12,7 @@
 
 #include "calibration/camera_pairs.h"
 #include "calibration/image_residuals.h"
+#include "calibration/late_camera.h"
 #include "calibration/rig_refinement.h"
 #include "tracking/frame_record.h"
 
@@ -82,7 +83,8 @@ struct CalibrationRecord {
   std::vector<calibration::CameraPair> pairs =
       {};                        // that are contradicted or hardly matched; without keyframes if no map was started
   bool scale_unfounded = false;  // no two cameras agree on which the scale could be based
-  std::vector<std::size_t> disagreeing = {};  // cameras that were inconsistent for most of the run
+  std::vector<std::size_t> disagreeing = {};         // cameras that were inconsistent for most of the run
+  std::optional<calibration::LateCamera> late = {};  // looked for if the images contradict the calibration
 
   // Sets `applies` and `refined`. `complete`: the run was not interrupted; the map of an interrupted run may use an
   // estimate from its beginning, of which nothing is known. `replaced`: the map uses an estimated rig.

@@ -340,16 +340,15 @@ Files output_files(const SessionResult& result, const system::Config& config) {
 
 }  // namespace
 
-Status write_outputs(const SessionResult& result, const system::Config& config, const std::filesystem::path& folder,
-                     const std::optional<ReportSource>& report) {
-  Status first_failure;
+std::vector<Error> write_outputs(const SessionResult& result, const system::Config& config,
+                                 const std::filesystem::path& folder, const std::optional<ReportSource>& report) {
+  std::vector<Error> failures;
   const auto write = [&](const std::string& name, const std::string& bytes) {
-    const Status status = write_atomically(folder / name, bytes);
-    if (!status && first_failure.ok()) first_failure = status;
+    if (const Status status = write_atomically(folder / name, bytes); !status) failures.push_back(status.error());
   };
   for (const auto& [name, bytes] : output_files(result, config)) write(name, bytes);
   if (report) write("report.html", report_page(result, config, *report));
-  return first_failure;
+  return failures;
 }
 
 }  // namespace bslam::session

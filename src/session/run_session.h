@@ -71,9 +71,9 @@ struct ReportSource {
 
 // Writes summary.json, trajectory.tum, trajectory_live.tum (further submaps: ..._part2.tum), config.yaml,
 // rig_refined.yaml if extrinsics were refined, trajectory.svg, run.svg and, with a `report`, report.html, in this
-// order. Each file is written completely or not at all. If one cannot be written, the others are written nevertheless,
-// and the first error is returned.
-Status write_outputs(const SessionResult& result, const system::Config& config, const std::filesystem::path& folder,
-                     const std::optional<ReportSource>& report = {});
+// order. Each file is written completely or not at all. If one cannot be written, the others are written nevertheless.
+// Returns an error for each that could not be.
+std::vector<Error> write_outputs(const SessionResult& result, const system::Config& config,
+                                 const std::filesystem::path& folder, const std::optional<ReportSource>& report = {});
 
 }  // namespace bslam::session

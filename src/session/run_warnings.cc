@@ -83,6 +83,12 @@ void warn_of_timing(const std::string& name, const calibration::CameraRefinement
   }
 }
 
+std::string contradiction_text(const RunRecord& record) {
+  return fmt::format(
+      "the images contradict the calibration, which multiplies their squared reprojection error by {:.1f}",
+      1 + record.calibration.estimate.excess_error);
+}
+
 std::string what_became_of_estimate(const RunRecord& record) {
   const CalibrationRecord& calibration = record.calibration;
   if (calibration.refined) return "it was refined: see calibration in summary.json, and rig_refined.yaml";
@@ -107,9 +113,7 @@ void warn_of_estimate(const RunRecord& record, const camera::Rig& rig, Warnings&
     warn_of_timing(record.cameras[c].name, calibration.estimate.cameras[c], warnings);
   }
   if (!contradicted) return;
-  warn(warnings,
-       "the images contradict the calibration, which multiplies their squared reprojection error by {:.1f}; {}",
-       1 + calibration.estimate.excess_error, what_became_of_estimate(record));
+  warn(warnings, "{}; {}", contradiction_text(record), what_became_of_estimate(record));
 }
 
 // Lists the intervals without a pose.
@@ -238,6 +242,13 @@ std::string foreign_images_text(const RunRecord& record) {
                      others > 0 ? fmt::format(" (and {} more pairs)", others) : "");
 }
 
+std::string unreliable_map_text(const RunRecord& record) {
+  if (std::string foreign = foreign_images_text(record); !foreign.empty()) return foreign;
+  const CalibrationRecord& calibration = record.calibration;
+  const bool contradicted = calibration.estimate.verdict == calibration::Verdict::kInconsistent;
+  return contradicted && !calibration.refined && record.complete ? contradiction_text(record) : "";
+}
+
 std::vector<std::string> warnings_before_run(const dataset::Dataset& dataset) {
   constexpr std::size_t kShown = 2;
   Warnings warnings = dataset.warnings;
@@ -251,6 +262,9 @@ std::vector<std::string> warnings_before_run(const dataset::Dataset& dataset) {
 std::vector<std::string> warnings_after_run(const RunRecord& record, const camera::Rig& rig,
                                             const std::string& check_command) {
   Warnings warnings;
+  if (const auto& late = record.calibration.late)
+    warnings.push_back(calibration::describe_late_camera(*late, record.cameras[late->camera].name,
+                                                         record.cameras[late->reference].name));
   warn_of_pairs(record, check_command, warnings);
   for (std::size_t c = 0; c < record.cameras.size(); ++c) {
     const CameraRecord& camera = record.cameras[c];

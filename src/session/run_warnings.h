@@ -15,6 +15,9 @@ std::vector<std::string> warnings_before_run(const dataset::Dataset& dataset);
 
 // Says which pair of cameras shows that the images do not belong to the calibration; empty if none does.
 std::string foreign_images_text(const RunRecord& record);
+// Says why the map of a run cannot be relied on: the images do not belong to the calibration, or contradict it and it
+// was not refined; empty otherwise.
+std::string unreliable_map_text(const RunRecord& record);
 
 // After the run: cameras that were out or inconsistent with all other cameras, images that could not be used, dropped
 // frames, losses and submaps, a calibration that the images contradict, and cameras of `rig` (those in use, as

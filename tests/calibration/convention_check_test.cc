@@ -116,7 +116,7 @@ TEST(ConventionCheck, IgnoresOtherPosesWithSlightlyMoreMatches) {
   const PairEvidence evidence = judged(rig, views);
   EXPECT_LT(evidence.agreeing[0], 28);
   EXPECT_FALSE(evidence.other);
-  EXPECT_EQ(describe_evidence(std::array{evidence}).find("warning"), std::string::npos);
+  EXPECT_EQ(describe_evidence(std::array{evidence}).find("contradict"), std::string::npos);
 }
 
 TEST(ConventionCheck, ReportsTheNumberOfTestedPairs) {
@@ -129,6 +129,21 @@ TEST(ConventionCheck, ReportsTheNumberOfTestedPairs) {
   const PairEvidence also{
       .first = 1, .second = 2, .matches = 100, .agreeing = {90, 1, 2, 3, 4}, .verdict = Convention::kAsGiven};
   EXPECT_NE(describe_evidence(std::array{good, apart, also}).find("1 of 3 pairs could not be tested\n"),
+            std::string::npos);
+}
+
+TEST(ConventionCheck, SaysWhyAPairWasNotTestedAndWarnsIfItHasMuchOverlap) {
+  const PairEvidence good{
+      .first = 0, .second = 1, .matches = 100, .agreeing = {90, 1, 2, 3, 4}, .verdict = Convention::kAsGiven};
+  const PairEvidence apart{.first = 0, .second = 2, .overlap = 0.01, .matches = 10};
+  const PairEvidence blank{.first = 1, .second = 2, .overlap = 0.5, .matches = 10};
+  EXPECT_EQ(describe_pair(apart),
+            "not tested: too few matches for a decision (10); the calibrated views overlap by 1 %");
+  EXPECT_EQ(describe_pair(blank),
+            "not tested: too few matches for a decision (10); the calibrated views overlap by 50 %");
+  EXPECT_EQ(describe_evidence(std::array{good, apart}).find("warning"), std::string::npos);
+  EXPECT_NE(describe_evidence(std::array{good, apart, blank})
+                .find("warning: 1 of 2 pairs with much overlap could not be tested: cameras 1 and 2\n"),
             std::string::npos);
 }
 

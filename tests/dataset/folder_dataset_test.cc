@@ -176,8 +176,29 @@ TEST_F(ImageFolders, NamesMayBeDecimalSeconds) {
   expect_error(open({"a", "b"}, {}, {.unit_ns = 1000}), "--stamp-unit: found a recording with times of its own");
 }
 
-TEST_F(ImageFolders, NamesOfSecondsAndUnpaddedNanosecondsAreAskedAbout) {
-  add("cam0", [](int k) { return "12." + std::string(k < 3 ? "9" : "10") + std::to_string(1000000 + k) + ".png"; });
+TEST_F(ImageFolders, NamesOfSecondsMayLackZerosOnOneSide) {
+  add("cam0", [](int k) { return "12." + std::to_string(30'000'000 + 50'000'000 * k) + ".png"; });
+  auto dataset = open({"a"});  // nanoseconds: 30000000 is no decimal, which would end without zeros
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(dataset->frames[0].time_ns, 12'030'000'000);
+  EXPECT_EQ(dataset->frames[3].time_ns, 12'180'000'000);
+  fs::remove_all(data());
+  add("cam0", [](int k) { return "7." + std::to_string(20'000 + 50'001 * k) + ".png"; });  // microseconds
+  dataset = open({"a"});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(dataset->frames[0].time_ns, 7'020'000'000);
+  EXPECT_EQ(dataset->frames[1].time_ns, 7'070'001'000);
+  fs::remove_all(data());
+  const char* const decimals[] = {"7.2", "7.254321", "7.3", "7.35", "7.4", "7.45"};
+  add("cam0", [&](int k) { return std::string(decimals[k]) + ".png"; });
+  dataset = open({"a"});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(dataset->frames[3].time_ns, 7'350'000'000);
+}
+
+TEST_F(ImageFolders, NamesOfSecondsWithZerosOnBothSidesAreAskedAbout) {
+  const char* const names[] = {"7.012", "7.070", "7.122345", "7.173211", "7.223100", "7.273000"};
+  add("cam0", [&](int k) { return std::string(names[k]) + ".png"; });
   expect_error(open({"a"}), "expected as many digits in all names");
 }
 
@@ -233,6 +254,112 @@ TEST_F(ImageFolders, TimesOfNumbersAreListed) {
   const auto rate = open({"front", "back"}, {}, {.rate_hz = 20});  // says what the numbers are
   ASSERT_TRUE(rate) << rate.error().message();
   EXPECT_EQ(rate->frames[3].time_ns, 150'000'000);
+  EXPECT_TRUE(has_text(rate->warnings, "times.txt: not used, since --rate says when the images were taken"));
+}
+
+TEST_F(ImageFolders, TheUnitOfAListMayBeGiven) {
+  add("cam0", numbered);
+  support::write_text(data() / "times.txt", "1000\n1050\n1100\n1150\n1200\n1250\n");
+  expect_error(open({"a"}), "--stamp-unit UNIT says what whole numbers are");
+  const auto dataset = open({"a"}, {}, {.unit_ns = 1'000'000});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(dataset->frames[3].time_ns, 1'150'000'000);
+  support::write_text(data() / "times.txt", "1.00\n1.05\n1.10\n1.15\n1.20\n1.25\n");
+  expect_error(open({"a"}, {}, {.unit_ns = 1'000'000}),
+               "times.txt: found times with a decimal point, which are seconds, expected whole numbers with "
+               "--stamp-unit");
+}
+
+TEST_F(ImageFolders, ListsMayHavePathsAndNameImagesThatAreNotThere) {
+  add("front", numbered);
+  add("back", numbered);
+  std::string both, own;
+  for (int k = 0; k < kImages; ++k) {
+    both += std::to_string(1 + k) + ".5 front/" + numbered(k) + "\n";
+    own += std::to_string(1 + k) + ".5 ./" + numbered(k) + "\n";
+  }
+  support::write_text(data() / "times.txt", both);
+  support::write_text(data() / "back/times.txt", own);
+  fs::remove(data() / "front" / numbered(2));
+  fs::remove(data() / "front" / numbered(4));
+  const auto dataset = open({"front", "back"});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(dataset->frames[3].images[1]->time_ns, 4'500'000'000);
+  EXPECT_TRUE(has_text(dataset->warnings, "front: 2 of 6 listed images are not there, the first: "));
+  EXPECT_TRUE(has_text(dataset->warnings, "front/000002.png"));
+}
+
+TEST_F(ImageFolders, OneListMayNameImagesThatAreOneFolderDeeper) {
+  add("front/data", numbered);
+  add("back/data", numbered);
+  std::string both;
+  for (int k = 0; k < kImages; ++k) {
+    both += std::to_string(1 + k) + ".5 front/data/" + numbered(k) + "\n";
+    both += std::to_string(1 + k) + ".6 back/data/" + numbered(k) + "\n";
+  }
+  support::write_text(data() / "times.txt", both);
+  const auto dataset = open({"front", "back"});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(dataset->frames[0].images[0]->time_ns, 1'500'000'000);
+  EXPECT_EQ(dataset->frames.back().images[1]->time_ns, 6'600'000'000);
+  EXPECT_TRUE(dataset->warnings.empty() || !has_text(dataset->warnings, "another image"));
+}
+
+TEST_F(ImageFolders, OfOneCameraMayBeAnyCameraOfTheRig) {
+  add_stamped(".");
+  const fs::path three = rig({"a", "b", "c"});
+  const auto dataset = open_dataset({.path = data(), .rig_file = three, .cameras = {2}});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(dataset->rig.camera(0u).name, "c");
+  expect_error(open({"a"}, {"front"}), "expected no --topics, since ");
+}
+
+TEST_F(ImageFolders, ThatAreNamedAreTheCamerasThatAreSelected) {
+  for (const char* name : {"one", "two", "three", "four"}) add_stamped(name);
+  const auto dataset = open_dataset(
+      {.path = data(), .rig_file = rig({"a", "b", "c", "d"}), .topics = {"three", "one"}, .cameras = {3, 1}});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(dataset->rig.camera(0u).name, "d");
+  EXPECT_EQ(folder_of(*dataset, 0), "three");
+}
+
+TEST_F(ImageFolders, AreDescribedAsARunWouldUseThem) {
+  for (const char* name : {"a", "b", "c"}) add(name, numbered);
+  fs::remove(data() / "b" / numbered(3));
+  const fs::path file = rig({"a", "b", "c"});
+  DatasetRequest request{.path = data(), .rig_file = file, .cameras = {2, 1}, .time_stamps = {.rate_hz = 10}};
+  auto described = describe_recording(request);
+  ASSERT_TRUE(described);
+  EXPECT_EQ(described->refusal, "");
+  EXPECT_TRUE(described->missing.empty());
+  EXPECT_EQ(described->streams[0].camera, -1);
+  EXPECT_EQ(described->streams[1].camera, 1);
+  EXPECT_EQ(described->streams[2].camera, 0);
+  EXPECT_EQ(described->streams[0].times[1], 100'000'000);
+  EXPECT_EQ(described->streams[0].stamps, "names, 10 images per second");
+  EXPECT_TRUE(has_text(described->streams[1].notes, "1 image is missing at 10.0 Hz, the first after 0.200 s of it"));
+  request.begin_s = 5;
+  described = describe_recording(request);
+  ASSERT_TRUE(described);
+  EXPECT_EQ(described->refusal, open_dataset(request).error().message());
+  EXPECT_NE(described->refusal.find("a range that contains frames"), std::string::npos);
+}
+
+TEST_F(ImageFolders, AJumpOfTheClockIsSaid) {
+  add("cam0", [](int k) {
+    return std::to_string(1'000'000'000'000 + 50'000'000LL * k + (k > 2) * 300'000'000'000LL) + ".png";
+  });
+  const auto dataset = open({"a"});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_TRUE(has_text(dataset->warnings, "walk: time stamps jump by 300.1 s after 0.100 s: two recordings in one"));
+}
+
+TEST_F(ImageFolders, ImagesOfHalfTheResolutionAreRecognised) {
+  for (int k = 0; k < kImages; ++k) support::write_image(data() / "cam0" / numbered(k), 30, 10, k);
+  const auto dataset = open({"a"}, {}, {.rate_hz = 10});
+  expect_error(dataset, "60x20, the resolution of the calibration; it looks like images of half the resolution");
+  const auto described = describe_recording({.path = data(), .rig_file = rig({"a"}), .time_stamps = {.rate_hz = 10}});
+  EXPECT_TRUE(has_text(described->missing, "it looks like images of half the resolution"));
 }
 
 TEST_F(ImageFolders, ListsMayNameTheImages) {
@@ -249,7 +376,8 @@ TEST_F(ImageFolders, ListsMayNameTheImages) {
   ASSERT_EQ(dataset->frames.size(), static_cast<std::size_t>(kImages) - 1);
   EXPECT_EQ(dataset->frames[4].time_ns, 1'305'031'104'175'304'000);
   EXPECT_EQ(dataset->frames[4].images[0]->path.filename(), "colour4x28.png");
-  EXPECT_TRUE(has_text(dataset->warnings, "a file that looks like an image is not used: "));
+  EXPECT_TRUE(has_text(dataset->warnings, "1 of 6 images in ")) << dataset->warnings[0];
+  EXPECT_TRUE(has_text(dataset->warnings, "are not listed and are not used, the first: colour5x35.png"));
   csv += "1000010000000,colour5x35.png\n";
   support::write_text(data() / "rgb/data.csv", csv);
   dataset = open({"a"});

@@ -87,6 +87,30 @@ TEST(MergeMaps, DoesNotDependOnTheOrderOfTheMaps) {
   EXPECT_EQ(bytes_of(merged(maps).value()), expected);
 }
 
+// All lengths of a map multiplied.
+SavedMap scaled(const SavedMap& original, double factor) {
+  map::BundledMap map = original.map;
+  for (const KeyframeId root : map.roots()) EXPECT_TRUE(map.scale_submap(root, factor));
+  return saved(map, original.info.data);
+}
+
+TEST(MergeMaps, SaysWhichMapsDisagreeAboutTheScale) {
+  const MergeResult& usual = merged_runs();
+  ASSERT_EQ(usual.scales.size(), 2u);  // of a and b, b and c
+  for (const ScaleComparison& c : usual.scales) {
+    EXPECT_EQ(c.first, 0u);
+    EXPECT_NEAR(c.ratio, 1, 0.005);
+    EXPECT_FALSE(c.disagrees());
+  }
+  const auto result = merged({runs()[1], scaled(runs()[0], 1.03)});
+  ASSERT_TRUE(result);
+  ASSERT_EQ(result->scales.size(), 1u);
+  EXPECT_EQ(result->inputs[result->scales[0].second].data, "a");
+  EXPECT_NEAR(result->scales[0].ratio, 1.03, 0.005);
+  EXPECT_LT(result->scales[0].deviation, 0.01);
+  EXPECT_TRUE(result->scales[0].disagrees());
+}
+
 TEST(MergeMaps, RejectsTheSameMapTwice) {
   const auto result = merged({runs()[0], runs()[1], runs()[0]});
   ASSERT_FALSE(result);

@@ -3,12 +3,15 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "calibration/convention_check.h"
 #include "calibration/rig_warnings.h"
 #include "camera/stereo_rig.h"
 #include "containers/mcap_writer.h"
 #include "containers/ros_writer.h"
+#include "dataset/frame_reader.h"
 #include "dataset/live_recording.h"
 #include "rig_formats/bslam_rig.h"
 #include "rig_formats/rig_file.h"
@@ -129,6 +132,19 @@ TEST_F(RigReport, TestsTheExtrinsicsAgainstImages) {
   const auto apart = report_rig({.file = (folder_ / "late.yaml").string(), .images = images});
   ASSERT_TRUE(apart) << apart.error().message();
   EXPECT_NE(apart->find("no images taken at the same time"), std::string::npos) << *apart;
+
+  const auto data = dataset::open_dataset({.path = images});
+  ASSERT_TRUE(data) << data.error().message();
+  std::vector<image::ImageBundle> frames;
+  for (std::size_t k = 0; k < data->frames.size(); ++k) {
+    image::Image& image = frames.emplace_back(dataset::read_frame(*data, k)).images[1].image;
+    for (int y = 0; y < image.height(); ++y) std::reverse(image.row(y), image.row(y) + image.width());
+  }
+  const auto mirrored = calibration::check_conventions(rig, frames, std::vector<image::Image>(2));
+  ASSERT_TRUE(mirrored[0].mirrored) << calibration::describe_evidence(mirrored);
+  EXPECT_EQ(mirrored[0].mirrored->camera, 1u);
+  EXPECT_NE(calibration::describe_evidence(mirrored).find("warning: the images of camera 1 are mirrored"),
+            std::string::npos);
 }
 
 }  // namespace

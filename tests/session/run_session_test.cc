@@ -195,9 +195,9 @@ TEST_F(Session, WritesAllItsFiles) {
   for (const CameraRecord& c : result->record.cameras) EXPECT_EQ(c.images, 8);
 
   const fs::path out = folder() / "out";
-  EXPECT_FALSE(write_outputs(*result, o.config, out).ok());  // the caller must create the folder
+  EXPECT_GT(write_outputs(*result, o.config, out).size(), 5u);  // the caller must create the folder
   fs::create_directory(out);
-  ASSERT_TRUE(write_outputs(*result, o.config, out).ok());
+  ASSERT_TRUE(write_outputs(*result, o.config, out).empty());
   for (const char* name : {"trajectory.tum", "trajectory_live.tum", "covariance_live.csv", "summary.json",
                            "config.yaml", "trajectory.svg", "run.svg"}) {
     EXPECT_GT(fs::file_size(out / name), 50u) << name;
@@ -221,7 +221,7 @@ TEST_F(Session, WritesTheReportIfItIsAskedFor) {
   result->record.data = hostile;
   const fs::path out = folder() / "report";
   fs::create_directory(out);
-  ASSERT_TRUE(write_outputs(*result, o.config, out, ReportSource{data, "bslam run '" + hostile + "'"}).ok());
+  ASSERT_TRUE(write_outputs(*result, o.config, out, ReportSource{data, "bslam run '" + hostile + "'"}).empty());
   EXPECT_EQ(std::distance(fs::directory_iterator(out), fs::directory_iterator()), 8);
   std::ostringstream text;
   text << std::ifstream(out / "report.html").rdbuf();
@@ -311,7 +311,7 @@ TEST_F(Session, WritesFilesForEverySubmap) {
       {KeyframeId(7), {result->trajectories.front().poses.begin() + 5, result->trajectories.front().poses.end()}});
   const fs::path out = folder() / "parts";
   fs::create_directory(out);
-  ASSERT_TRUE(write_outputs(*result, o.config, out).ok());
+  ASSERT_TRUE(write_outputs(*result, o.config, out).empty());
   const auto lines = [&](const char* name) {
     std::ifstream file(out / name);
     return std::count(std::istreambuf_iterator<char>(file), {}, '\n');
@@ -329,7 +329,7 @@ TEST_F(Session, WritesTheStampsOfImagesIfRequested) {
   result->subtracted_ns = 3'000'000;
   const fs::path out = folder() / "stamps";
   fs::create_directories(out);
-  ASSERT_TRUE(write_outputs(*result, options().config, out).ok());
+  ASSERT_TRUE(write_outputs(*result, options().config, out).empty());
   std::ostringstream text;
   text << std::ifstream(out / "trajectory.tum").rdbuf();
   EXPECT_NE(text.str().find("\n# time stamps are those of the images"), std::string::npos);
@@ -402,7 +402,7 @@ TEST_F(Session, EndsWhenInterrupted) {
   EXPECT_FALSE(nothing->record.complete);
   EXPECT_TRUE(nothing->record.frames.empty());
   fs::create_directory(folder() / "nothing");
-  EXPECT_TRUE(write_outputs(*nothing, o.config, folder() / "nothing").ok());
+  EXPECT_TRUE(write_outputs(*nothing, o.config, folder() / "nothing").empty());
 }
 
 TEST_F(Session, ReplaysCompleteAndInterruptedRuns) {

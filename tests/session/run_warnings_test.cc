@@ -30,5 +30,29 @@ TEST(RunWarnings, AFocalLengthThatIsFarOffIsSaid) {
   }
 }
 
+TEST(RunWarnings, ACameraThatIsOneFrameLateIsNamedFirst) {
+  RunRecord record;
+  record.cameras.resize(2);
+  record.cameras[0].name = "left";
+  record.cameras[1].name = "right";
+  record.calibration.late = calibration::LateCamera{1, 0, false, 90, 20, 100, 95};
+  const std::vector<std::string> warnings = warnings_after_run(record, synthetic::default_rig(), "");
+  EXPECT_EQ(warnings[0].find("right: its images are about one frame late compared with left: 95 of 100 matches"), 0u)
+      << warnings[0];
+}
+
+// A map of a calibration that was contradicted and kept is stored with the reason.
+TEST(RunWarnings, AMapOfAContradictedCalibrationIsUnreliable) {
+  RunRecord record;
+  record.complete = true;
+  EXPECT_EQ(unreliable_map_text(record), "");
+  record.calibration.estimate.verdict = calibration::Verdict::kInconsistent;
+  record.calibration.estimate.excess_error = 2;
+  EXPECT_EQ(unreliable_map_text(record),
+            "the images contradict the calibration, which multiplies their squared reprojection error by 3.0");
+  record.calibration.refined = true;
+  EXPECT_EQ(unreliable_map_text(record), "");
+}
+
 }  // namespace
 }  // namespace bslam::session

@@ -151,7 +151,7 @@ TEST_F(CommandLine, TheTargetOfRerunIsCheckedBeforeTheRun) {
                       "*main*) printf 'log\\n\\033[1;31mError\\033[0m: no room\\n'; exit 2 ;;\nesac\n");
   fs::permissions(interpreter, fs::perms::owner_all);
   ::setenv("BSLAM_PYTHON", interpreter.c_str(), 1);
-  support::write_text(file, "precious");
+  support::write_text(file, "RRF2 precious");
   const std::string base = "run " + data() + " --end 0.3 --set features.per_image=300 --progress never --out ";
   for (const auto& [target, message] :
        {std::pair(file, "run.rrd: --rerun: found an existing file"),
@@ -160,7 +160,7 @@ TEST_F(CommandLine, TheTargetOfRerunIsCheckedBeforeTheRun) {
     expect_rejected(base + out("rejected") + " --rerun " + target);
     EXPECT_NE(run(base + out("rejected") + " --rerun " + target).err.find(message), std::string::npos) << target;
   }
-  EXPECT_EQ(read_text(file), "precious");
+  EXPECT_EQ(read_text(file), "RRF2 precious");
   const Ran failed = run(base + out("shown") + " --overwrite --rerun " + file);
   ::unsetenv("BSLAM_PYTHON");
   EXPECT_EQ(failed.status, 2);

@@ -1,0 +1,104 @@
+#include "calibration/late_camera.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "calibration/convention_check.h"
+#include "feature/extractor.h"
+
+namespace bslam::calibration {
+namespace {
+
+// Keypoints of a camera in the frames of a triple; empty without an image.
+using Views = std::array<feature::Detections, 3>;
+
+std::vector<std::vector<Views>> extract_views(const camera::Rig& rig, std::span<const FrameTriple> triples,
+                                              std::span<const image::Image> masks) {
+  std::vector<std::vector<Views>> views(rig.size(), std::vector<Views>(triples.size()));
+  feature::Extractor extractor({});
+  image::Pyramid pyramid;
+  for (std::size_t t = 0; t < triples.size(); ++t) {
+    for (std::size_t f = 0; f < triples[t].size(); ++f) {
+      for (std::size_t c = 0; c < rig.size(); ++c) {
+        const image::CameraImage& image = triples[t][f].images[c];
+        if (image.state == image::ImageState::kPresent)
+          extractor.extract(image.view(), masks[c].view(), rig.camera(c), pyramid, views[c][t][f]);
+      }
+    }
+  }
+  return views;
+}
+
+// Matches of images of frame 1 of the first camera and of frame `of_second` of the second one.
+PairEvidence compare(const camera::Rig& rig, std::size_t i, std::size_t j, const std::vector<std::vector<Views>>& views,
+                     std::size_t of_second) {
+  std::vector<feature::Detections> of_i, of_j;
+  for (std::size_t t = 0; t < views[i].size(); ++t) {
+    of_i.push_back(views[i][t][1]);
+    of_j.push_back(views[j][t][of_second]);
+  }
+  return judge_pair(rig, i, j, of_i, of_j);
+}
+
+// What the pair shows, of its second camera; nullopt if images of the same frame fit as well.
+std::optional<LateCamera> judge(const camera::Rig& rig, std::size_t i, std::size_t j,
+                                const std::vector<std::vector<Views>>& views) {
+  constexpr int kMinAgreeing = 60;
+  constexpr double kGoodShare = 0.6, kClearly = 1.3, kMuchLarger = 0.15;
+  const PairEvidence same = compare(rig, i, j, views, 1);
+  if (same.matches < kMinAgreeing) return std::nullopt;
+  const auto share = [](const PairEvidence& e) { return e.matches > 0 ? 1.0 * e.agreeing[0] / e.matches : 0.0; };
+  std::optional<LateCamera> out;
+  for (const std::size_t frame : {0u, 2u}) {
+    const PairEvidence apart = compare(rig, i, j, views, frame);
+    if (apart.agreeing[0] < kMinAgreeing || apart.matches > 2 * same.matches ||
+        share(apart) < std::max(kGoodShare, share(same) + kMuchLarger) ||
+        apart.agreeing[0] < kClearly * same.agreeing[0] || (out && apart.agreeing[0] < out->agreeing_apart))
+      continue;
+    out = LateCamera{j, i, frame == 0, same.matches, same.agreeing[0], apart.matches, apart.agreeing[0]};
+  }
+  return out;
+}
+
+}  // namespace
+
+std::optional<LateCamera> find_late_camera(const camera::Rig& rig, std::span<const FrameTriple> triples,
+                                           std::span<const image::Image> masks) {
+  constexpr double kMuchOverlap = 0.2;
+  const std::vector<std::vector<Views>> views = extract_views(rig, triples, masks);
+  std::vector<LateCamera> found;
+  std::vector<int> votes(rig.size(), 0);
+  for (std::size_t i = 0; i < rig.size(); ++i) {
+    for (std::size_t j = i + 1; j < rig.size(); ++j) {
+      if (std::max(rig.overlap_share(i, j), rig.overlap_share(j, i)) < kMuchOverlap) continue;
+      const auto late = judge(rig, i, j, views);
+      if (!late) continue;
+      found.push_back(*late);
+      ++votes[i];
+      ++votes[j];
+    }
+  }
+  if (found.empty()) return std::nullopt;
+  const auto most = std::ranges::max_element(found, {}, [&](const LateCamera& late) {
+    return std::pair(std::max(votes[late.camera], votes[late.reference]), late.agreeing_apart);
+  });
+  LateCamera out = *most;
+  if (votes[out.reference] > votes[out.camera]) {
+    std::swap(out.camera, out.reference);
+    out.early = !out.early;
+  }
+  return out;
+}
+
+std::string describe_late_camera(const LateCamera& late, const std::string& camera, const std::string& reference) {
+  return fmt::format(
+      "{}: its images are about one frame {} compared with {}: {} of {} matches of images that are one frame apart are "
+      "consistent with the calibration, and {} of {} of the same frame: check the numbers or time stamps of its images",
+      camera, late.early ? "early" : "late", reference, late.agreeing_apart, late.matches_apart, late.agreeing,
+      late.matches);
+}
+
+}  // namespace bslam::calibration
