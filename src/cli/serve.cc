@@ -73,10 +73,10 @@ Error of_options(const Error& error) {
   return {"command line", error.key == "address" ? "--address" : "--port", error.found, error.expected};
 }
 
-void print_warnings_of(const ServeArguments& a, const storage::SavedMap& saved) {
-  if (!saved.info.warning.empty())
+void print_warnings_of(const ServeArguments& a, const map_service::MapSource& source) {
+  if (!source.warning.empty())
     std::fprintf(stderr, "warning: %s: the run that made this map has found: %s\n", a.map.c_str(),
-                 saved.info.warning.c_str());
+                 source.warning.c_str());
   const bool local = a.address.starts_with("127.") || a.address == "::1";
   if (!local && a.token.empty())
     std::fprintf(stderr, "warning: --address %s without --token: everybody who reaches this port can use the service\n",
@@ -110,7 +110,6 @@ int serve(const ServeArguments& a) {
   if (!served) return report_error(served.error());
   auto masks = image_decoding::read_masks(served->rig);
   if (!masks) return report_error(masks.error());
-  print_warnings_of(a, served->saved);
 
   const map_service::ServiceOptions options = service_options(a);
   if (config->execution.threads == 0) config->execution.threads = std::max(1, cores() / options.workers);
@@ -120,6 +119,7 @@ int serve(const ServeArguments& a) {
   auto service = map_service::MapService::start(options, localiser,
                                                 map_service::map_json(source, localiser->map(), localiser->rig()));
   if (!service) return report_error(of_options(service.error()));
+  print_warnings_of(a, source);
   fmt::print("serving {} at {} ({} worker{})\n", a.map, (*service)->url(), options.workers,
              options.workers == 1 ? "" : "s");
   std::fflush(stdout);

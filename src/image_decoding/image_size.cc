@@ -39,14 +39,19 @@ std::optional<ImageSize> size_of_webp(std::string_view bytes) {
   return ImageSize{static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(height)};
 }
 
-}  // namespace
-
-std::optional<ImageSize> size_in_header(std::string_view bytes) {
+std::optional<ImageSize> size_by_format(std::string_view bytes) {
   if (bytes.starts_with("\x89PNG\r\n\x1a\n")) return size_of_png(bytes);
   if (bytes.starts_with("\xff\xd8")) return size_of_jpeg(bytes);
   if (bytes.starts_with("RIFF")) return size_of_webp(bytes);
   const auto size = size_of_pnm(bytes);
   return size ? std::optional(ImageSize{size->first, size->second}) : std::nullopt;
+}
+
+}  // namespace
+
+std::optional<ImageSize> size_in_header(std::string_view bytes) {
+  const auto size = size_by_format(bytes);
+  return size && size->width > 0 && size->height > 0 ? size : std::nullopt;
 }
 
 }  // namespace bslam::image_decoding
