@@ -8,7 +8,8 @@ namespace bslam::fuzz {
 // The first line is the type of the request, the rest its body.
 std::vector<std::string> seeds() {
   const std::string part = "--b\r\nContent-Disposition: form-data; name=\"cam0\"; filename=\"a.png\"\r\n\r\npixels\r\n";
-  return {"multipart/form-data; boundary=b\n" + part + "--b--\r\n", "multipart/form-data; boundary=\"b\"\n" + part + part + "--b--",
+  return {"multipart/form-data; boundary=b\n" + part + "--b--\r\n",
+          "multipart/form-data; boundary=\"b\"\n" + part + part + "--b--",
           "multipart/form-data; charset=utf-8; boundary=b\n--b--"};
 }
 

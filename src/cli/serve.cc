@@ -48,7 +48,8 @@ Result<ServedMap> read_served_map(const ServeArguments& a, const system::Config&
   if (!rig) return rig.error();
   const std::size_t rigs = map::first_cameras_of_rigs(own->map).back() > 0 ? 2 : 1;
   if (a.rig.empty() && rigs > 1)
-    return Error{a.map, "--rig", "nothing, for a map of several rigs", "the calibration of the cameras of the requests"};
+    return Error{a.map, "--rig", "nothing, for a map of several rigs",
+                 "the calibration of the cameras of the requests"};
   if (own->info.vocabulary == 0)
     return Error{a.map, "vocabulary", "none", "a map with visual words, in which places can be recognised"};
   if (const Status s = storage::check_continued(*own, *rig, config.feature_model().pyramid, &vocabulary); !s)

@@ -92,9 +92,7 @@ Result<image::ImageBundle> images_of_request(std::string_view content_type, std:
       return Error{"form", "", "the part " + rig.camera(*c).name + " twice", "one image per camera"};
     auto image = decode(part.content, rig.camera(*c));
     if (!image) return image.error();
-    to = {.state = image::ImageState::kPresent,
-          .time_ns = rig.camera(*c).time_offset_ns,
-          .image = *std::move(image)};
+    to = {.state = image::ImageState::kPresent, .time_ns = rig.camera(*c).time_offset_ns, .image = *std::move(image)};
   }
   bundle.time_ns = time_of(bundle);
   return bundle;

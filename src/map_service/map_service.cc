@@ -131,8 +131,8 @@ class MapService::Implementation final : public web_server::RequestHandler {
   }
 
   Gauges gauges() const {
-    return {queue_.size(), options_.queue, static_cast<std::size_t>(options_.workers), localiser_->map().num_keyframes(),
-            localiser_->map().num_landmarks()};
+    return {queue_.size(), options_.queue, static_cast<std::size_t>(options_.workers),
+            localiser_->map().num_keyframes(), localiser_->map().num_landmarks()};
   }
 
   // ---- Called by the workers

@@ -43,7 +43,8 @@ std::string Metrics::text(const Gauges& gauges) const {
   std::string out;
   begin_metric(out, "bslam_requests_total", "counter", "Requests by path and status.");
   for (const auto& [key, count] : requests_)
-    out += "bslam_requests_total{path=\"" + key.first + "\",status=\"" + number(key.second) + "\"} " + number(count) + "\n";
+    out += "bslam_requests_total{path=\"" + key.first + "\",status=\"" + number(key.second) + "\"} " + number(count) +
+           "\n";
   append_metric(out, "bslam_rejected_total", "counter", "Requests that were answered with 503.", rejected_);
   begin_metric(out, "bslam_frames_total", "counter", "Frames by result.");
   out += "bslam_frames_total{localised=\"true\"} " + number(localised_) + "\n";

@@ -1,5 +1,5 @@
-// Localisation of single frames in a map that is not changed: each frame is relocalised as the first frame of a run in a
-// loaded map is, and independently of all other frames.
+// Localisation of single frames in a map that is not changed: each frame is relocalised as the first frame of a run in
+// a loaded map is, and independently of all other frames.
 #pragma once
 
 #include <memory>
@@ -26,7 +26,8 @@ class Localiser {
             std::vector<image::Image> masks = {});
 
   // The pose of a frame, which depends on its images and their times only. `images`: one entry per camera of the rig;
-  // images may be missing. A frame that is not found in the map is lost, with the reason. Errors: see check_frame in system/input_check.h.
+  // images may be missing. A frame that is not found in the map is lost, with the reason. Errors: see check_frame in
+  // system/input_check.h.
   Result<tracking::FrameRecord> localise(const image::ImageBundle& images) const;
 
   const camera::Rig& rig() const { return run_rig_; }

@@ -103,11 +103,12 @@ class Connection : public std::enable_shared_from_this<Connection> {
   void pass_on() {
     stream_.expires_never();
     std::string body = std::move(parser_.get().body());
-    all_.handler_.handle(
-        head_of(parser_.get()), std::move(body),
-        [self = shared_from_this(), executor = stream_.get_executor()](Response response) {
-          asio::post(executor, [self, response = std::move(response)]() mutable { self->respond(std::move(response)); });
-        });
+    all_.handler_.handle(head_of(parser_.get()), std::move(body),
+                         [self = shared_from_this(), executor = stream_.get_executor()](Response response) {
+                           asio::post(executor, [self, response = std::move(response)]() mutable {
+                             self->respond(std::move(response));
+                           });
+                         });
   }
 
   void fail(ErrorCode error) {

@@ -24,9 +24,9 @@ struct ServerOptions {
 };
 
 struct HttpLimits {
-  std::size_t connections = 16;          // further ones are closed at once
-  std::uint64_t body_bytes = 0;          // of one request; a longer one is answered with 413
-  std::uint64_t all_bodies_bytes = 0;    // of all requests that are not answered; a further one is answered with 503
+  std::size_t connections = 16;           // further ones are closed at once
+  std::uint64_t body_bytes = 0;           // of one request; a longer one is answered with 413
+  std::uint64_t all_bodies_bytes = 0;     // of all requests that are not answered; a further one is answered with 503
   std::chrono::seconds request_time{10};  // in which a whole request must arrive; else its connection is closed
 };
 

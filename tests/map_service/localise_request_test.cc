@@ -48,7 +48,8 @@ TEST(LocaliseRequest, AnySubsetOfTheCamerasMakesABundle) {
   EXPECT_EQ(images->images[1].state, image::ImageState::kPresent);
   EXPECT_EQ(images->images[1].view().at(3, 4), 7);
   EXPECT_EQ(images->time_ns, 5'000'000);  // the time offset of the camera
-  const auto both = images_of_request(kType, form({{"cam1", pgm(kWidth, kHeight)}, {"cam0", pgm(kWidth, kHeight)}}), rig());
+  const auto both =
+      images_of_request(kType, form({{"cam1", pgm(kWidth, kHeight)}, {"cam0", pgm(kWidth, kHeight)}}), rig());
   ASSERT_TRUE(both) << both.error().message();
   EXPECT_EQ(both->time_ns, 0);
   EXPECT_EQ(both->images[0].view().at(1, 1), 0x40);

@@ -10,8 +10,8 @@ namespace {
 constexpr const char* kType = "multipart/form-data; boundary=XyZ";
 
 std::string part(const std::string& name, const std::string& content) {
-  return "--XyZ\r\nContent-Disposition: form-data; name=\"" + name + "\"; filename=\"a.png\"\r\nContent-Type: image/png" +
-         "\r\n\r\n" + content + "\r\n";
+  return "--XyZ\r\nContent-Disposition: form-data; name=\"" + name +
+         "\"; filename=\"a.png\"\r\nContent-Type: image/png" + "\r\n\r\n" + content + "\r\n";
 }
 
 std::string message(const std::string& type, const std::string& body, const FormLimits& limits = {}) {
@@ -22,7 +22,8 @@ std::string message(const std::string& type, const std::string& body, const Form
 TEST(Multipart, PartsHaveTheirNamesAndEveryByteOfTheirContent) {
   const std::string binary("\r\n--Xy\0--XyY\r\n\r\n--", 18);
   const std::string body = part("cam0", binary) + part("cam1", "") + "--XyZ--\r\n";
-  for (const char* type : {kType, "multipart/form-data; boundary=\"XyZ\"", "Multipart/Form-Data; charset=x; BOUNDARY=XyZ"}) {
+  for (const char* type :
+       {kType, "multipart/form-data; boundary=\"XyZ\"", "Multipart/Form-Data; charset=x; BOUNDARY=XyZ"}) {
     const auto parts = parse_form(type, body);
     ASSERT_TRUE(parts) << parts.error().message();
     ASSERT_EQ(parts->size(), 2u);
@@ -36,7 +37,8 @@ TEST(Multipart, PartsHaveTheirNamesAndEveryByteOfTheirContent) {
 
 TEST(Multipart, NamesOfFilesDoNotMatter) {
   const std::string body =
-      "--XyZ\r\nX: y\r\ncontent-disposition:form-data; filename=\"a; name=\\\"no\\\"; b\" ; name=yes\r\n\r\n1\r\n--XyZ--";
+      "--XyZ\r\nX: y\r\ncontent-disposition:form-data; filename=\"a; name=\\\"no\\\"; b\" ; "
+      "name=yes\r\n\r\n1\r\n--XyZ--";
   const auto parts = parse_form(kType, body);
   ASSERT_TRUE(parts) << parts.error().message();
   EXPECT_EQ(parts->front().name, "yes");

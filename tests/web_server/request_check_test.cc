@@ -51,8 +51,9 @@ TEST(RequestCheck, ABearerTokenIsComparedAsAWhole) {
     return has_bearer_token({.target = "/", .authorization = authorization}, kToken);
   };
   EXPECT_TRUE(allowed("Bearer " + std::string(kToken)));
-  for (const std::string& wrong : {std::string(), std::string("Bearer "), "bearer " + std::string(kToken), std::string(kToken),
-                                   "Bearer " + std::string(kToken) + "0", "Bearer " + std::string(kToken.substr(1))})
+  for (const std::string& wrong :
+       {std::string(), std::string("Bearer "), "bearer " + std::string(kToken), std::string(kToken),
+        "Bearer " + std::string(kToken) + "0", "Bearer " + std::string(kToken.substr(1))})
     EXPECT_FALSE(allowed(wrong)) << wrong;
   EXPECT_FALSE(has_bearer_token({.target = "/", .authorization = "Bearer "}, ""));
 }
