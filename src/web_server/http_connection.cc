@@ -21,7 +21,7 @@ constexpr auto kResponseTime = std::chrono::seconds(30);
 constexpr auto kDrainTime = std::chrono::seconds(5);
 constexpr int kSendBuffer = 256 * 1024;  // bytes; more would only delay what is newest
 
-std::string_view view(boost::string_view text) { return {text.data(), text.size()}; }
+std::string_view view(beast::string_view text) { return {text.data(), text.size()}; }
 
 RequestHead head_of(const Request& request) {
   return {.target = view(request.target()),

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <opencv2/core/mat.hpp>
+#include <opencv2/imgcodecs.hpp>
 #include <string>
 
 #include "image_decoding/colour_image.h"
@@ -80,6 +81,16 @@ TEST(LocaliseRequest, DamagedImagesAreRefused) {
   for (const std::string& bytes : {std::string(), std::string("x"), png.substr(0, png.size() / 2), png.substr(0, 20),
                                    std::string("\xff\xd8\xff"), std::string("RIFF"), std::string("P5 64 48 255\n")})
     EXPECT_EQ(message({{"cam0", bytes}}), expected);
+}
+
+TEST(LocaliseRequest, AJpegWithCountlessScansIsRefused) {
+  std::vector<unsigned char> bytes;
+  cv::imencode(".jpg", cv::Mat(kHeight, kWidth, CV_8UC1, cv::Scalar(7)), bytes, {cv::IMWRITE_JPEG_PROGRESSIVE, 1});
+  std::string jpeg(bytes.begin(), bytes.end());
+  EXPECT_EQ(message({{"cam0", jpeg}}), "");
+  const std::string scan = jpeg.substr(jpeg.rfind("\xff\xda"));
+  for (int i = 0; i < 100; ++i) jpeg.insert(jpeg.size() - 2, scan.substr(0, scan.size() - 2));
+  EXPECT_NE(message({{"cam0", jpeg}}), "");
 }
 
 }  // namespace
