@@ -35,7 +35,8 @@ class ServiceError(Exception):
         retry_after: seconds after which a request may be sent again, if the server is busy; else None.
     """
 
-    def __init__(self, message: str, status: int = 0, retry_after: float | None = None) -> None:  # noqa: D107
+    def __init__(self, message: str, status: int = 0, retry_after: float | None = None) -> None:
+        """An error with the attributes of the class; `message` is one sentence."""
         super().__init__(message)
         self.status = status
         self.retry_after = retry_after

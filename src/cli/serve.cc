@@ -46,8 +46,8 @@ Result<ServedMap> read_served_map(const ServeArguments& a, const system::Config&
   if (!own) return own.error();
   auto rig = a.rig.empty() ? Result<camera::Rig>(own->map.given_rig()) : rig_formats::read_rig(a.rig);
   if (!rig) return rig.error();
-  const std::size_t rigs = map::first_cameras_of_rigs(own->map).back() > 0 ? 2 : 1;
-  if (a.rig.empty() && rigs > 1)
+  const bool several = map::first_cameras_of_rigs(own->map).back() > 0;
+  if (a.rig.empty() && several)
     return Error{a.map, "--rig", "nothing, for a map of several rigs",
                  "the calibration of the cameras of the requests"};
   if (own->info.vocabulary == 0)

@@ -114,7 +114,7 @@ Result<std::vector<FormPart>> parse_form(std::string_view content_type, std::str
   while (rest.substr(0, 2) != "--") {
     if (rest.substr(0, 2) != kEndOfLine) return damaged("a boundary without an end of line", "a complete form");
     if (parts.size() == limits.parts)
-      return Error{"form", "", "more than " + std::to_string(limits.parts) + " parts", "fewer"};
+      return Error{"form", "", "more than " + std::to_string(limits.parts) + " parts", "at most so many"};
     rest.remove_prefix(2);
     auto part = take_part(rest, delimiter, limits);
     if (!part) return part.error();

@@ -79,7 +79,7 @@ TEST(Multipart, DamagedPartsAreRefused) {
 TEST(Multipart, NumberOfPartsAndLengthOfHeadersAreLimited) {
   std::string many;
   for (int i = 0; i < 5000; ++i) many += part("cam0", "x");
-  EXPECT_EQ(message(kType, many + "--XyZ--", {.parts = 4}), "form: found more than 4 parts, expected fewer");
+  EXPECT_EQ(message(kType, many + "--XyZ--", {.parts = 4}), "form: found more than 4 parts, expected at most so many");
   const std::string name(100000, 'n');
   EXPECT_EQ(message(kType, part(name, "x") + "--XyZ--"),
             "form: found a part whose header does not end, expected an empty line after at most 2048 bytes");
