@@ -1,11 +1,6 @@
 """Asks a running `bslam serve` for the pose of images in its map. Needs nothing but NumPy and the standard library.
 
-    from bslam.client import Client
-
-    client = Client("http://127.0.0.1:8090")
-    found = client.localise({"cam0": image0, "cam1": image1})
-    if found.localised:
-        print(found.T_world_cam0)
+`Client("http://127.0.0.1:8090").localise({"cam0": image0, "cam1": image1})` returns a `Localisation`.
 """
 
 from __future__ import annotations

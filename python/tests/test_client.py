@@ -26,7 +26,10 @@ def client(server):
 
 
 def images_of(recording, frame):
-    return {camera.name: image for camera, image in zip(bslam.Rig.load(recording.folder).cameras, recording.images[frame], strict=True)}
+    return {
+        camera.name: image
+        for camera, image in zip(bslam.Rig.load(recording.folder).cameras, recording.images[frame], strict=True)
+    }
 
 
 def test_pixels_bytes_and_files_give_the_pose_of_the_run(client, recording, program_run):
