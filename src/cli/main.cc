@@ -32,6 +32,7 @@ int main(int argc, char** argv) {
   add_vocab(app, exit_status);
   add_map(app, exit_status);
   add_export(app, exit_status);
+  add_serve(app, exit_status);
   add_fleet(app, exit_status);
   add_settings(app, exit_status);
   try {

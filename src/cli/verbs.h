@@ -30,6 +30,7 @@ void add_export(CLI::App& app, int& exit_status);
 void add_map_export(CLI::App& map, int& exit_status);
 void add_map_merge(CLI::App& map, int& exit_status);
 void add_map_transfer(CLI::App& map, int& exit_status);
+void add_serve(CLI::App& app, int& exit_status);
 void add_fleet(CLI::App& app, int& exit_status);
 void add_settings(CLI::App& app, int& exit_status);
 

@@ -156,6 +156,14 @@ cv::Mat brightness(const cv::Mat& image) {
 
 bool is_plain_file(std::string_view bytes) { return is_pnm(bytes) || bytes.starts_with("BM") || is_tiff(bytes); }
 
+std::optional<std::pair<std::uint32_t, std::uint32_t>> size_of_pnm(std::string_view bytes) {
+  if (!is_pnm(bytes)) return std::nullopt;
+  std::string_view rest = bytes.substr(2);
+  const auto width = take_number(rest), height = take_number(rest);
+  if (!width || !height) return std::nullopt;
+  return std::pair(*width, *height);
+}
+
 cv::Mat decode_plain_file(std::string_view bytes) {
   if (is_pnm(bytes)) return decode_pnm(bytes);
   if (bytes.starts_with("BM")) return decode_bmp(bytes);

@@ -1,8 +1,11 @@
 // PNM (PGM, PPM), BMP and TIFF files in memory as matrices of grey values. Internal to this folder.
 #pragma once
 
+#include <cstdint>
 #include <opencv2/core/mat.hpp>
+#include <optional>
 #include <string_view>
+#include <utility>
 
 namespace bslam::image_decoding {
 
@@ -17,6 +20,9 @@ cv::Mat decode_plain_file(std::string_view bytes);
 
 // The same for TIFF.
 cv::Mat decode_tiff(std::string_view bytes);
+
+// Width and height in the header of a PNM of the kinds above; nullopt for other files.
+std::optional<std::pair<std::uint32_t, std::uint32_t>> size_of_pnm(std::string_view bytes);
 
 // Brightness of an image with 1, 3 (blue, green, red) or 4 channels.
 cv::Mat brightness(const cv::Mat& image);

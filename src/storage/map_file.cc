@@ -173,14 +173,20 @@ Result<SavedMap> open_map(const std::filesystem::path& file, const camera::Rig& 
                           const feature::PyramidShape& pyramid, const place::Vocabulary* vocabulary) {
   auto saved = read_map(file);
   if (!saved) return saved.error();
-  if (const Status status = fits(*saved, pyramid, vocabulary); !status) return status.error();
-  const std::size_t cameras = saved->map.rig().size() + (map::find_rig(saved->map, rig) ? 0 : rig.size());
+  if (const Status status = check_continued(*saved, rig, pyramid, vocabulary); !status) return status.error();
+  return saved;
+}
+
+Status check_continued(const SavedMap& saved, const camera::Rig& rig, const feature::PyramidShape& pyramid,
+                       const place::Vocabulary* vocabulary) {
+  if (const Status status = fits(saved, pyramid, vocabulary); !status) return status;
+  const std::size_t cameras = saved.map.rig().size() + (map::find_rig(saved.map, rig) ? 0 : rig.size());
   if (cameras > kMaxCameras) {
-    return Error{file.string(), "rig", fmt::format("{} cameras with those of this run", cameras),
+    return Error{saved.file, "rig", fmt::format("{} cameras with those of this run", cameras),
                  fmt::format("at most {}; a map with fewer rigs", kMaxCameras)};
   }
-  if (saved->map.num_keyframes() == 0) return Error{file.string(), "keyframes", "none", "a map with keyframes"};
-  return saved;
+  if (saved.map.num_keyframes() == 0) return Error{saved.file, "keyframes", "none", "a map with keyframes"};
+  return {};
 }
 
 Status fits(const SavedMap& saved, const feature::PyramidShape& pyramid, const place::Vocabulary* vocabulary) {

@@ -44,8 +44,12 @@ Result<SavedMap> read_map(const std::filesystem::path& file);
 // have one. The Error names the difference.
 Status fits(const SavedMap& saved, const feature::PyramidShape& pyramid, const place::Vocabulary* vocabulary);
 
-// Reads the map that a run with this rig, which may be any rig, continues. Errors: as for read_map and the first fits;
-// the map has no keyframes; it would have too many cameras with those of the run.
+// Checks that a run with this rig, which may be any rig, can continue the map. Errors: as for fits; the map has no
+// keyframes; it would have too many cameras with those of the run.
+Status check_continued(const SavedMap& saved, const camera::Rig& rig, const feature::PyramidShape& pyramid,
+                       const place::Vocabulary* vocabulary);
+
+// Reads the map that a run with this rig continues. Errors: as for read_map and check_continued.
 Result<SavedMap> open_map(const std::filesystem::path& file, const camera::Rig& rig,
                           const feature::PyramidShape& pyramid, const place::Vocabulary* vocabulary);
 

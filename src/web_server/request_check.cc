@@ -60,9 +60,19 @@ bool is_own_host(std::string_view host, bool loopback) {
 }
 
 bool is_allowed(const RequestHead& head, std::string_view token, bool loopback) {
-  if (token.empty() || !is_own_host(head.host, loopback)) return false;
-  if (!head.origin.empty() && head.origin != "http://" + std::string(head.host)) return false;
+  if (token.empty() || !is_own_request(head, loopback)) return false;
   return equal_in_constant_time(token_of(head.target), token);
+}
+
+bool is_own_request(const RequestHead& head, bool loopback) {
+  if (!is_own_host(head.host, loopback)) return false;
+  return head.origin.empty() || head.origin == "http://" + std::string(head.host);
+}
+
+bool has_bearer_token(const RequestHead& head, std::string_view token) {
+  constexpr std::string_view kScheme = "Bearer ";
+  const bool bearer = head.authorization.substr(0, kScheme.size()) == kScheme;
+  return bearer && !token.empty() && equal_in_constant_time(head.authorization.substr(kScheme.size()), token);
 }
 
 }  // namespace bslam::web_server

@@ -2,11 +2,9 @@
 
 #include <algorithm>
 #include <atomic>
-#include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/post.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/beast/core.hpp>
-#include <boost/beast/http.hpp>
 #include <boost/beast/websocket.hpp>
 #include <deque>
 #include <functional>
@@ -15,6 +13,7 @@
 #include <thread>
 #include <utility>
 
+#include "web_server/http_connection.h"
 #include "web_server/request_check.h"
 #include "web_server/server_thread.h"
 
@@ -23,20 +22,13 @@ namespace {
 
 namespace asio = boost::asio;
 namespace beast = boost::beast;
-namespace http = beast::http;
 namespace websocket = beast::websocket;
-using asio::ip::tcp;
 using ErrorCode = boost::system::error_code;
 using SharedText = std::shared_ptr<const std::string>;
-using Request = http::request<http::empty_body>;
 
-constexpr std::uint32_t kMaxHeader = 16 * 1024;
-constexpr auto kRequestTime = std::chrono::seconds(10);
-constexpr auto kResponseTime = std::chrono::seconds(30);
-constexpr int kSendBuffer = 256 * 1024;  // bytes; more would only delay what is newest
-constexpr double kMaxShare = 0.03;       // of the processor time of a core that updates of a channel may take
+constexpr double kMaxShare = 0.03;  // of the processor time of a core that updates of a channel may take
 
-std::string_view view(boost::string_view text) { return {text.data(), text.size()}; }
+}  // namespace
 
 struct LatestUpdate {
   SharedText text;
@@ -48,32 +40,17 @@ struct Hub {
   Content& content;
   std::vector<Channel> channels;
   std::vector<LatestUpdate> latest = std::vector<LatestUpdate>(channels.size());  // by channel
-  std::string token = make_token();
-  bool loopback = true;
   bool finishing = false;
-  std::size_t connections = 0;
   std::list<class Viewer*> viewers = {};
   std::function<void()> viewers_changed = {};
   std::function<void()> answered = {};  // a message was received
 };
 
-// Counts a connection as long as it lives.
-class Counted {
- public:
-  explicit Counted(Hub& hub) : hub_(hub) { ++hub_.connections; }
-  ~Counted() { --hub_.connections; }
-  Counted(const Counted&) = delete;
-  Counted& operator=(const Counted&) = delete;
-
- private:
-  Hub& hub_;
-};
-
 // A browser that gets updates.
 class Viewer : public std::enable_shared_from_this<Viewer> {
  public:
-  Viewer(Hub& hub, tcp::socket socket)
-      : hub_(hub), counted_(hub), socket_(std::move(socket)), sent_(hub.channels.size()) {}
+  Viewer(Hub& hub, Socket socket, Slot slot)
+      : hub_(hub), slot_(std::move(slot)), socket_(std::move(socket)), sent_(hub.channels.size()) {}
   ~Viewer() {
     if (listed_) hub_.viewers.remove(this);
     if (listed_ && hub_.viewers_changed) hub_.viewers_changed();
@@ -161,7 +138,7 @@ class Viewer : public std::enable_shared_from_this<Viewer> {
   }
 
   Hub& hub_;
-  const Counted counted_;
+  const Slot slot_;
   websocket::stream<beast::tcp_stream> socket_;
   Request request_;
   beast::flat_buffer buffer_;
@@ -171,113 +148,52 @@ class Viewer : public std::enable_shared_from_this<Viewer> {
   bool listed_ = false, closing_ = false;
 };
 
-// A connection that has sent no request yet, or is being answered.
-class Connection : public std::enable_shared_from_this<Connection> {
- public:
-  Connection(Hub& hub, tcp::socket socket) : hub_(hub), counted_(hub), stream_(std::move(socket)) {
-    parser_.header_limit(kMaxHeader);
-    parser_.body_limit(0);
-  }
-
-  void read() {
-    stream_.expires_after(kRequestTime);
-    http::async_read(stream_, buffer_, parser_, [self = shared_from_this()](ErrorCode error, std::size_t) {
-      if (!error) return self->answer(self->parser_.release());
-      if (error.category() == http::make_error_code(http::error::bad_method).category() &&
-          error != http::error::end_of_stream)
-        self->respond(http::status::bad_request, "This is not a request that this server understands.\n");
-    });
-  }
-
- private:
-  void answer(Request request) {
-    const RequestHead head{view(request.target()), view(request[http::field::host]),
-                           view(request[http::field::origin])};
-    if (!is_allowed(head, hub_.token, hub_.loopback))
-      return respond(http::status::forbidden, "Open the address that bslam has printed, with its token.\n");
-    if (path_of(head.target) == "/live" && websocket::is_upgrade(request)) {
-      stream_.expires_never();
-      std::make_shared<Viewer>(hub_, stream_.release_socket())->accept(std::move(request));
-      return;
-    }
-    if (request.method() != http::verb::get)
-      return respond(http::status::method_not_allowed, "This server answers GET only.\n");
-    if (path_of(head.target) != "/") return respond(http::status::not_found, "There is nothing here.\n");
-    // The page consists of one file, and has a connection to this server only.
-    const std::string policy =
-        "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; "
-        "connect-src 'self' ws://" +
-        std::string(head.host) + "; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
-    response_.set("Content-Security-Policy", policy);
-    respond(http::status::ok, hub_.content.page(), "text/html; charset=utf-8");
-  }
-
-  void respond(http::status status, std::string body, const char* type = "text/plain; charset=utf-8") {
-    response_.result(status);
-    response_.set(http::field::content_type, type);
-    response_.set(http::field::cache_control, "no-store");
-    response_.set("Referrer-Policy", "no-referrer");
-    response_.set("X-Content-Type-Options", "nosniff");
-    response_.keep_alive(false);
-    response_.body() = std::move(body);
-    response_.prepare_payload();
-    stream_.expires_after(kResponseTime);
-    http::async_write(stream_, response_, [self = shared_from_this()](ErrorCode, std::size_t) {
-      ErrorCode ignored;
-      self->stream_.socket().shutdown(tcp::socket::shutdown_send, ignored);
-    });
-  }
-
-  Hub& hub_;
-  const Counted counted_;
-  beast::tcp_stream stream_;
-  beast::flat_buffer buffer_{kMaxHeader + 1024};
-  http::request_parser<http::empty_body> parser_;
-  http::response<http::string_body> response_;
-};
-
-}  // namespace
-
-class Server::Implementation {
+class Server::Implementation final : public RequestHandler {
  public:
   Implementation(std::vector<Channel> channels, Content& content)
-      : hub_{.content = content, .channels = std::move(channels)} {
+      : hub_{.content = content, .channels = std::move(channels)},
+        connections_({.connections = kMaxConnections}, *this, [this](Request request, Socket socket, Slot slot) {
+          std::make_shared<Viewer>(hub_, std::move(socket), std::move(slot))->accept(std::move(request));
+        }) {
     hub_.viewers_changed = [this] { on_viewers_changed(); };
     hub_.answered = [this] {
       for (std::size_t c = 0; c < hub_.channels.size(); ++c) {
         if (hub_.channels[c].answers) refresh(c);
       }
     };
-    for (std::size_t c = 0; c < hub_.channels.size(); ++c) timers_.emplace_back(context_);
+    for (std::size_t c = 0; c < hub_.channels.size(); ++c) timers_.emplace_back(connections_.context());
     ticking_.resize(hub_.channels.size());
   }
 
-  ~Implementation() {
-    context_.stop();
+  ~Implementation() override {
+    connections_.context().stop();
     if (thread_.joinable()) thread_.join();
     hub_.viewers_changed = {};
   }
 
   Status listen(const ServerOptions& options) {
-    ErrorCode error;
-    const asio::ip::address address = asio::ip::make_address(options.address, error);
-    if (error) return Error{"web server", "address", options.address, "an IP address of this machine, such as 0.0.0.0"};
-    hub_.loopback = address.is_loopback();
-    error = open({address, options.port});
-    if (error == asio::error::address_in_use && options.or_any_port) error = open({address, 0});
-    const std::string port = "port " + std::to_string(options.port);
-    if (error == asio::error::address_in_use)
-      return Error{"web server", "port", port + ", which is in use", "a free port, or 0 for any free one"};
-    if (error == asio::error::access_denied)
-      return Error{"web server", "port", port + ", which is not permitted", "a port above 1023, or 0 for any free one"};
-    if (error)
-      return Error{"web server", "address", options.address + ": " + error.message(), "an address of this machine"};
-    const std::string host = address.is_unspecified() ? "127.0.0.1" : options.address;
-    url_ = "http://" + (address.is_v6() && !address.is_unspecified() ? "[" + host + "]" : host) + ":" +
-           std::to_string(acceptor_.local_endpoint().port()) + "/?token=" + hub_.token;
-    accept();
+    if (const Status s = connections_.listen(options); !s) return s;
+    url_ = connections_.url() + "/?token=" + token_;
     thread_ = std::thread([this] { run(); });
     return {};
+  }
+
+  std::optional<Response> refuse(const RequestHead& head) override {
+    if (!is_allowed(head, token_, connections_.loopback()))
+      return Response{403, "Open the address that bslam has printed, with its token.\n"};
+    if (path_of(head.target) == "/live" && head.websocket) return std::nullopt;
+    if (head.method != "GET") return Response{405, "This server answers GET only.\n"};
+    if (path_of(head.target) != "/") return Response{404, "There is nothing here.\n"};
+    return std::nullopt;
+  }
+
+  void handle(const RequestHead& head, std::string, Respond respond) override {
+    // The page consists of one file, and has a connection to this server only.
+    const std::string policy =
+        "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; "
+        "connect-src 'self' ws://" +
+        std::string(head.host) + "; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+    respond({200, hub_.content.page(), "text/html; charset=utf-8", {{"Content-Security-Policy", policy}}});
   }
 
   const std::string& url() const { return url_; }
@@ -285,7 +201,7 @@ class Server::Implementation {
 
   void finish(std::chrono::milliseconds limit) {
     std::future<void> finished = finished_.get_future();
-    asio::post(context_, [this] { begin_finish(); });
+    asio::post(connections_.context(), [this] { begin_finish(); });
     finished.wait_for(limit);
   }
 
@@ -293,34 +209,11 @@ class Server::Implementation {
   void run() {
     lower_priority();
     try {
-      context_.run();
+      connections_.context().run();
     } catch (const std::exception&) {  // such as a lack of memory: whoever has a server does not depend on it
-      acceptor_.close();
+      connections_.close();
       set_finished();
     }
-  }
-
-  ErrorCode open(const tcp::endpoint& endpoint) {
-    ErrorCode error;
-    if (acceptor_.is_open()) acceptor_.close();
-    acceptor_.open(endpoint.protocol(), error);
-    if (!error) acceptor_.set_option(tcp::acceptor::reuse_address(true), error);
-    if (!error) acceptor_.bind(endpoint, error);
-    if (!error) acceptor_.listen(asio::socket_base::max_listen_connections, error);
-    return error;
-  }
-
-  void accept() {
-    acceptor_.async_accept([this](ErrorCode error, tcp::socket socket) {
-      if (error == asio::error::operation_aborted) return;
-      if (!error && hub_.connections < kMaxConnections && !hub_.finishing) {
-        ErrorCode ignored;
-        socket.set_option(asio::socket_base::send_buffer_size(kSendBuffer), ignored);
-        socket.set_option(tcp::no_delay(true), ignored);
-        std::make_shared<Connection>(hub_, std::move(socket))->read();
-      }
-      accept();
-    });
   }
 
   void on_viewers_changed() {
@@ -356,7 +249,7 @@ class Server::Implementation {
 
   void begin_finish() {
     hub_.finishing = true;
-    acceptor_.close();
+    connections_.close();
     if (hub_.viewers.empty()) return set_finished();
     for (std::size_t c = 0; c < hub_.channels.size(); ++c) refresh(c);
     for (Viewer* viewer : hub_.viewers) viewer->close_after_sending();
@@ -366,9 +259,9 @@ class Server::Implementation {
     if (!std::exchange(is_finished_, true)) finished_.set_value();
   }
 
-  Hub hub_;  // declared first: connections that the context destroys use it
-  asio::io_context context_{1};
-  tcp::acceptor acceptor_{context_};
+  Hub hub_;  // declared first: connections that are destroyed use it
+  const std::string token_ = make_token();
+  Connections connections_;
   std::vector<asio::steady_timer> timers_;  // by channel, like the next one
   std::vector<char> ticking_;
   std::string url_;

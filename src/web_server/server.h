@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "base/result.h"
+#include "web_server/http_server.h"
 
 namespace bslam::web_server {
 
@@ -36,12 +37,6 @@ struct Channel {
   std::string name;
   std::chrono::milliseconds interval;  // between updates, at least
   bool answers = false;                // updated after every message from a browser as well
-};
-
-struct ServerOptions {
-  std::string address = "127.0.0.1";  // of the interface
-  std::uint16_t port = 0;             // 0: any free one
-  bool or_any_port = false;           // if the port is in use, any free one is taken
 };
 
 class Server {

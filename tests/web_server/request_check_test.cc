@@ -46,6 +46,18 @@ TEST(RequestCheck, TheOriginIsThatOfTheHost) {
     EXPECT_FALSE(is_allowed({target, "127.0.0.1:8642", origin}, kToken, true)) << origin;
 }
 
+TEST(RequestCheck, ABearerTokenIsComparedAsAWhole) {
+  const auto allowed = [](const std::string& authorization) {
+    return has_bearer_token({.target = "/", .authorization = authorization}, kToken);
+  };
+  EXPECT_TRUE(allowed("Bearer " + std::string(kToken)));
+  for (const std::string& wrong :
+       {std::string(), std::string("Bearer "), "bearer " + std::string(kToken), std::string(kToken),
+        "Bearer " + std::string(kToken) + "0", "Bearer " + std::string(kToken.substr(1))})
+    EXPECT_FALSE(allowed(wrong)) << wrong;
+  EXPECT_FALSE(has_bearer_token({.target = "/", .authorization = "Bearer "}, ""));
+}
+
 TEST(RequestCheck, TokensDiffer) {
   const std::string a = make_token(), b = make_token();
   EXPECT_EQ(a.size(), 32u);
