@@ -71,8 +71,10 @@ struct FrameResult {
   // Covariance of T_world_cam0, if known: of the small motion d, rotation first, in the axes of camera 0, with
   // T_world_cam0(true) = T_world_cam0 exp(d). Relative to the first keyframe of the submap, or to a loaded map: image
   // noise, the drift of the map and, if the calibration was estimated from the images, its remaining error, such as
-  // that of the scale of the baselines. A given calibration counts as exact. The standard deviations of the position of
-  // camera 0 along its own axes are the square roots of elements 21, 28 and 35. Nullopt in the first frame of a map.
+  // that of the scale of the baselines. A given calibration counts as exact after the images of some eight keyframes
+  // have not contradicted it, or if calibration.refine is false; until then, the covariance contains the error that it
+  // may have. The standard deviations of the position of camera 0 along its own axes are the square roots of elements
+  // 21, 28 and 35. Nullopt in the first frame of a map.
   std::optional<Covariance6> covariance;
   // Of the body frame, in its own axes: the mean since the previous frame; nullopt if that has no pose.
   std::optional<Velocity> velocity;

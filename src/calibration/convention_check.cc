@@ -283,9 +283,8 @@ std::string describe_pair(const PairEvidence& pair) {
   const auto agreeing = [&](Convention c) { return pair.agreeing[static_cast<std::size_t>(c)]; };
   if (pair.mirrored) {
     return fmt::format(
-        "{} of {} matches are consistent with the calibration if the images of camera {} are mirrored left to right; "
-        "{} "
-        "with it as given",
+        "{} of {} matches are consistent with the calibration if the images of camera {} are mirrored left to "
+        "right; {} with it as given",
         pair.mirrored->agreeing, pair.mirrored->matches, pair.mirrored->camera, agreeing(Convention::kAsGiven));
   }
   if (pair.exchanged) {

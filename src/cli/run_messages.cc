@@ -62,9 +62,8 @@ std::string doubt_text(const session::RunRecord& record) {
 std::string_view untested_text(const session::RunRecord& record) {
   if (record.cameras.size() < 2) return "calibration: not tested, which takes several cameras: there is a single one";
   if (record.map.scale != "metric") return "calibration: not tested, which takes a map of metric scale";
-  return "calibration: not tested, which takes more motion, and landmarks in several keyframes, or calibration.check "
-         "is "
-         "false";
+  return "calibration: not tested, which takes more motion, and landmarks in several keyframes, or "
+         "calibration.check is false";
 }
 
 // Whether the images agree with the calibration. Silence would be taken for agreement.

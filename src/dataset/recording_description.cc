@@ -190,6 +190,8 @@ Result<RecordingDescription> describe_recording(const DatasetRequest& request) {
   out.warnings.insert(out.warnings.begin(), damage.begin(), damage.end());
   try_images(request, *opened->recording, out);
   number_cameras(request, *opened->recording, out);
+  const bool calibrated = request.rig_file || opened->recording->calibrated() || rig_file_in_folder(request);
+  out.only_uncalibrated = !calibrated && out.missing.empty();
   const std::vector<std::string> missing = missing_for(request, *opened->recording, out.streams);
   out.missing.insert(out.missing.end(), missing.begin(), missing.end());
   out.synchrony = synchrony(out.streams, request.sync_tolerance_s);

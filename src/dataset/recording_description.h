@@ -47,7 +47,8 @@ struct RecordingDescription {
   bool proposed = true;  // which stream is which camera was not requested
   std::vector<std::string> warnings = {};
   std::vector<std::string> missing = {};  // what `run` needs beside the recording; empty if it would run
-  std::string refusal = {};  // the error with which `run` would refuse the recording; empty if it would run
+  std::string refusal = {};        // the error with which `run` would refuse the recording; empty if it would run
+  bool only_uncalibrated = false;  // nothing is known to be wrong, except that there is no calibration
   std::vector<SynchronyDescription> synchrony = {};  // of all cameras except 0
 };
 

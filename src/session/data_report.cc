@@ -182,7 +182,8 @@ Result<DataReport> report_data(const dataset::DatasetRequest& request, bool json
   const auto recording = dataset::describe_recording(request);
   if (!recording) return recording.error();
   const std::string path = request.path.string();
-  return DataReport{json ? as_json(path, *recording) : as_text(path, *recording), recording->refusal.empty()};
+  return DataReport{json ? as_json(path, *recording) : as_text(path, *recording),
+                    recording->refusal.empty() || recording->only_uncalibrated};
 }
 
 }  // namespace bslam::session

@@ -10,7 +10,7 @@ namespace bslam::session {
 
 struct DataReport {
   std::string text;   // or JSON
-  bool runs = false;  // `run` would not refuse the recording
+  bool runs = false;  // `run` would not refuse the recording, except that it may need a calibration
 };
 
 // Returns text or JSON for stdout: format, duration, and for every topic, folder or video its type, images and times;
