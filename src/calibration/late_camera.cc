@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdlib>
 #include <utility>
 
 #include "calibration/convention_check.h"
@@ -11,6 +12,17 @@
 
 namespace bslam::calibration {
 namespace {
+
+// Whether the images of each frame were taken together: within a quarter of the interval between frames. Images of
+// cameras that fire one after the other may be nearer to those of the next frame.
+bool are_together(const FrameTriple& triple) {
+  const TimeNs interval_ns = (triple[2].time_ns - triple[0].time_ns) / 2;
+  return std::ranges::all_of(triple, [&](const image::ImageBundle& frame) {
+    return std::ranges::all_of(frame.images, [&](const image::CameraImage& image) {
+      return image.state != image::ImageState::kPresent || 4 * std::abs(image.time_ns - frame.time_ns) <= interval_ns;
+    });
+  });
+}
 
 // Keypoints of a camera in the frames of a triple; empty without an image.
 using Views = std::array<feature::Detections, 3>;
@@ -68,6 +80,7 @@ std::optional<LateCamera> judge(const camera::Rig& rig, std::size_t i, std::size
 std::optional<LateCamera> find_late_camera(const camera::Rig& rig, std::span<const FrameTriple> triples,
                                            std::span<const image::Image> masks) {
   constexpr double kMuchOverlap = 0.2;
+  if (!std::ranges::all_of(triples, are_together)) return std::nullopt;
   const std::vector<std::vector<Views>> views = extract_views(rig, triples, masks);
   std::vector<LateCamera> found;
   std::vector<int> votes(rig.size(), 0);

@@ -26,8 +26,8 @@ struct LateCamera {
 using FrameTriple = std::array<image::ImageBundle, 3>;
 
 // Compares images of overlapping cameras at the same frame and one frame apart. Only if the rig moves between frames
-// can it be told. If several pairs of cameras show a difference, the camera of most of them is returned. `masks` as in
-// check_conventions.
+// can it be told, and only if the images of a frame were taken together. If several pairs of cameras show a difference,
+// the camera of most of them is returned. `masks` as in check_conventions.
 std::optional<LateCamera> find_late_camera(const camera::Rig& rig, std::span<const FrameTriple> triples,
                                            std::span<const image::Image> masks);
 

@@ -204,17 +204,6 @@ std::vector<geometry::PoseUncertainty::Effect> effects_on_poses(const Eigen::Mat
   return out;
 }
 
-Eigen::MatrixXd information_of_prior(const CalibrationBlocks& blocks, const solver::RigValues& values) {
-  Eigen::MatrixXd prior = Eigen::MatrixXd::Zero(blocks.size, blocks.size);
-  Eigen::VectorXd gradient = Eigen::VectorXd::Zero(blocks.size);
-  int at = 0;
-  for (const auto& block : blocks.blocks) {
-    block->add_prior(values, prior.block(at, at, block->size(), block->size()), gradient.segment(at, block->size()));
-    at += block->size();
-  }
-  return prior;
-}
-
 // Computes covariances and observed degrees of freedom at the current values. Returns false if the information is
 // singular.
 bool assess(solver::BundleEquations& equations, const CalibrationBlocks& blocks, const solver::RigValues& calibrated,
@@ -222,7 +211,7 @@ bool assess(solver::BundleEquations& equations, const CalibrationBlocks& blocks,
   equations.linearise();
   const auto information = equations.rig_information();
   if (!information) return false;
-  const Eigen::MatrixXd prior = information_of_prior(blocks, out.values);
+  const Eigen::MatrixXd prior = solver::information_of_prior(blocks.blocks, out.values);
   const Eigen::MatrixXd of_images = *information - prior;
   const double scale = solver::kVarianceLeft / solver::kFractionLeft / std::max(1.0, out.variance_factor);
   const Eigen::LLT<Eigen::MatrixXd> factor(scale * of_images + prior);
@@ -299,7 +288,7 @@ bool run_round(const solver::ReprojectionProblem& problem, const Round& round, c
 Eigen::MatrixXd prior_information(const solver::RigValues& calibrated, const RigAdjustmentOptions& options) {
   const CalibrationBlocks blocks = make_blocks(calibrated, options, {});
   const Eigen::VectorXd unit = physical_units(options, blocks.size);
-  return unit.asDiagonal() * information_of_prior(blocks, calibrated) * unit.asDiagonal() /
+  return unit.asDiagonal() * solver::information_of_prior(blocks.blocks, calibrated) * unit.asDiagonal() /
          options.correlated_observations;
 }
 

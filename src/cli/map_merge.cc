@@ -61,16 +61,17 @@ void print_json(const session::MergeResult& merged) {
 }
 
 // The maps are not scaled: metric maps whose scales differ contain a wrong calibration.
-void warn_of_scales(const session::MergeResult& merged) {
+std::vector<std::string> scale_warnings(const session::MergeResult& merged) {
+  std::vector<std::string> out;
   for (const session::ScaleComparison& c : merged.scales) {
     if (!c.disagrees()) continue;
-    fmt::print(
-        stderr,
-        "warning: the scales of {} and {} disagree: lengths are {:.2f} % {} in the second (std {:.2f} %); no map "
-        "was scaled, so the merged map is distorted: check the baselines of both calibrations\n",
-        merged.inputs[c.first].file, merged.inputs[c.second].file, 100 * std::abs(c.ratio - 1),
-        c.ratio > 1 ? "longer" : "shorter", 100 * c.deviation);
+    out.push_back(
+        fmt::format("the scales of {} and {} disagree: lengths are {:.2f} % {} in the second (std {:.2f} %); no map "
+                    "was scaled, so the merged map is distorted: check the baselines of both calibrations",
+                    merged.inputs[c.first].file, merged.inputs[c.second].file, 100 * std::abs(c.ratio - 1),
+                    c.ratio > 1 ? "longer" : "shorter", 100 * c.deviation));
   }
+  return out;
 }
 
 void print_text(const session::MergeResult& merged) {
@@ -102,10 +103,12 @@ Result<session::MergeResult> merge(const MergeArguments& arguments, const place:
   return merged;
 }
 
-Status write(const session::MergeResult& merged, const place::Vocabulary& vocabulary, const std::string& file) {
+Status write(const session::MergeResult& merged, const place::Vocabulary& vocabulary,
+             const std::vector<std::string>& warnings, const std::string& file) {
   std::vector<std::string> recordings;
   for (const session::MergedInput& input : merged.inputs) recordings.push_back(input.data);
-  const storage::MapFileInfo info{vocabulary.id(), version_number(), fmt::format("{}", fmt::join(recordings, " + "))};
+  const storage::MapFileInfo info{vocabulary.id(), version_number(), fmt::format("{}", fmt::join(recordings, " + ")),
+                                  warnings.empty() ? "" : warnings.front()};
   return storage::write_map(merged.map, info, file);
 }
 
@@ -118,10 +121,11 @@ int map_merge(const MergeArguments& arguments) {
   if (!vocabulary) return report_error(vocabulary.error());
   const auto merged = merge(arguments, *vocabulary);
   if (!merged) return report_error(merged.error());
+  const std::vector<std::string> warnings = scale_warnings(*merged);
   if (!arguments.dry_run) {
-    if (const Status s = write(*merged, **vocabulary, arguments.out); !s) return report_error(s.error());
+    if (const Status s = write(*merged, **vocabulary, warnings, arguments.out); !s) return report_error(s.error());
   }
-  warn_of_scales(*merged);
+  for (const std::string& warning : warnings) fmt::print(stderr, "warning: {}\n", warning);
   arguments.json ? print_json(*merged) : print_text(*merged);
   if (!arguments.dry_run && !arguments.json) fmt::print("{}\n", arguments.out);
   return kExitOk;

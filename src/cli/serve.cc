@@ -148,7 +148,8 @@ void add_serve(CLI::App& app, int& exit_status) {
   verb->add_option("--max-request-mb", a->max_request_mb, "size of a request in MB (2^20 bytes); longer: 413")
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
-  verb->add_option("--token", a->token, "answer only requests with the header Authorization: Bearer TOKEN");
+  verb->add_option("--token", a->token, "answer only requests with the header Authorization: Bearer TOKEN")
+      ->check([](const std::string& text) { return std::string(text.empty() ? "must not be empty" : ""); });
   verb->add_option("--vocabulary", a->vocabulary,
                    "vocabulary of the map, in bslam or DBoW2 text format; default: the one shipped with this program");
   add_config_options(*verb, a->config);

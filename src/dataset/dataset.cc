@@ -111,7 +111,7 @@ Status group(const DatasetRequest& request, const std::vector<std::vector<image_
   return {};
 }
 
-// Warns if no camera has images for so long that the recording is probably two, or its clock was set.
+// Warns if no camera has images for so long that the recording may be two, or its clock may have been set.
 void warn_of_jumps(const fs::path& path, Dataset& dataset) {
   constexpr TimeNs kLong_ns = 60'000'000'000;
   constexpr TimeNs kIntervals = 20;
@@ -125,7 +125,8 @@ void warn_of_jumps(const fs::path& path, Dataset& dataset) {
   }
   if (jumps == 0) return;
   dataset.warnings.push_back(fmt::format(
-      "{}: time stamps jump by {:.1f} s after {:.3f} s{}: two recordings in one, or a clock that was set (--begin and "
+      "{}: time stamps jump by {:.1f} s after {:.3f} s{}: two recordings in one, a clock that was set, or a pause "
+      "(--begin and "
       "--end select a part)",
       path.string(), to_seconds(times[first] - times[first - 1]), to_seconds(times[first - 1] - dataset.first_time_ns),
       jumps > 1 ? fmt::format(", and {} more times", jumps - 1) : ""));
@@ -294,8 +295,8 @@ Result<Dataset> dataset_of(const DatasetRequest& original, const OpenRecording& 
   if (const Status status = describe_pixels(request, *images, dataset); !status) return status.error();
   if (!request.rig_file) number_as_recorded(recording, dataset);
   if (const Status status = group(request, *images, dataset); !status) return status.error();
-  warn_of_jumps(request.path, dataset);
   if (const Status status = keep_range(request, dataset); !status) return status.error();
+  warn_of_jumps(request.path, dataset);
   return dataset;
 }
 

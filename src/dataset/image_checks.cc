@@ -107,7 +107,7 @@ void add_once(const std::string& warning, std::vector<std::string>& warnings) {
 std::string resolution_hint(int width, int height, const camera::Camera& camera) {
   constexpr double kRounded = 1;  // pixels
   const double factor = static_cast<double>(width) / camera.width;
-  if (width <= 0 || std::abs(height - factor * camera.height) > kRounded) return {};
+  if (width <= 0 || width == camera.width || std::abs(height - factor * camera.height) > kRounded) return {};
   const std::string part = factor == 0.5 ? "half" : factor == 2 ? "twice" : fmt::format("{:.3g} times", factor);
   return fmt::format("; it looks like images of {} the resolution, for which its intrinsics must be scaled", part);
 }

@@ -106,7 +106,7 @@ std::optional<std::string> gaps_note(const std::vector<TimeNs>& times) {
     regular += steps == 1;
   }
   if (missing == 0 || regular < kMostlyRegular * static_cast<double>(times.size() - 1)) return std::nullopt;
-  return fmt::format("{:.0f} image{} missing at {:.1f} Hz, the first after {:.3f} s of it", missing,
+  return fmt::format("{:.0f} image{} missing at {:.1f} Hz, the first {:.3f} s after its first image", missing,
                      missing == 1 ? " is" : "s are", 1e9 / interval_ns, to_seconds(times[first - 1] - times.front()));
 }
 
@@ -190,12 +190,15 @@ Result<RecordingDescription> describe_recording(const DatasetRequest& request) {
   out.warnings.insert(out.warnings.begin(), damage.begin(), damage.end());
   try_images(request, *opened->recording, out);
   number_cameras(request, *opened->recording, out);
-  const bool calibrated = request.rig_file || opened->recording->calibrated() || rig_file_in_folder(request);
-  out.only_uncalibrated = !calibrated && out.missing.empty();
+  const bool images_fit = out.missing.empty();
   const std::vector<std::string> missing = missing_for(request, *opened->recording, out.streams);
   out.missing.insert(out.missing.end(), missing.begin(), missing.end());
   out.synchrony = synchrony(out.streams, request.sync_tolerance_s);
   try_to_open(request, *opened, out);
+  for (std::size_t c = 0; images_fit && c < opened->recording->camera_count(); ++c) {
+    const auto calibration = opened->recording->calibration(c);
+    out.only_uncalibrated |= !calibration && calibration.error().message() == out.refusal;
+  }
   return out;
 }
 

@@ -48,7 +48,7 @@ struct RecordingDescription {
   std::vector<std::string> warnings = {};
   std::vector<std::string> missing = {};  // what `run` needs beside the recording; empty if it would run
   std::string refusal = {};        // the error with which `run` would refuse the recording; empty if it would run
-  bool only_uncalibrated = false;  // nothing is known to be wrong, except that there is no calibration
+  bool only_uncalibrated = false;  // the error is that there is no calibration, and the images have no faults
   std::vector<SynchronyDescription> synchrony = {};  // of all cameras except 0
 };
 

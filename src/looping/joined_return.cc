@@ -9,8 +9,8 @@ namespace bslam::looping {
 namespace {
 
 constexpr int kAway = 10;  // successive keyframes without sight of a place after which seeing it again is a return
-// A place is in sight while at least this fraction of its landmarks is that is observed on the return. In a wide room,
-// cameras all around observe some of it from everywhere.
+// A place is in sight of a keyframe that shares at least this fraction of the landmarks that the returning keyframe
+// shares with it. In a wide room, cameras all around observe some of a place from everywhere.
 constexpr double kInSight = 0.25;
 
 double distance(const map::BundledMap& map, KeyframeId a, KeyframeId b) {

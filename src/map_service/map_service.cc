@@ -145,7 +145,10 @@ class MapService::Implementation final : public web_server::RequestHandler {
       } catch (const std::exception&) {  // such as a lack of memory
         response = error_response(500, "the server has failed to process this request");
       }
-      job->respond(std::move(response));
+      try {
+        job->respond(std::move(response));
+      } catch (const std::exception&) {  // the connection ends without an answer
+      }
     }
   }
 

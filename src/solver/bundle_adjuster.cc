@@ -10,7 +10,7 @@ namespace bslam::solver {
 
 namespace {
 
-// Extrinsics and intrinsics in radians, metres and the units of the models, without a prior.
+// Extrinsics and intrinsics in radians, metres and the units of the models. Their priors must be subtracted.
 RigBlocks calibration_blocks(const RigValues& rig) {
   IntrinsicPrior intrinsics;
   for (const camera::CameraModel& model : rig.models) {
@@ -25,16 +25,13 @@ RigBlocks calibration_blocks(const RigValues& rig) {
   return blocks;
 }
 
-// The n of thinned_out(): about kPointsPerPose points per free pose remain.
-std::size_t thinning(const BundleStructure& structure) {
+// Flags all observations but those of every n-th point, with n such that about kPointsPerPose points per free pose
+// remain. `skip` is empty or flags observations that are ignored anyway.
+std::vector<std::uint8_t> thinned_out(const ReprojectionProblem& problem, const BundleStructure& structure,
+                                      std::span<const std::uint8_t> skip) {
   constexpr std::size_t kPointsPerPose = 50;
   const std::size_t wanted = kPointsPerPose * structure.pose_of_slot.size();
-  return std::max<std::size_t>(1, structure.num_points() / std::max<std::size_t>(1, wanted));
-}
-
-// Flags all observations but those of every n-th point. `skip` is empty or flags observations that are ignored anyway.
-std::vector<std::uint8_t> thinned_out(const ReprojectionProblem& problem, std::size_t every,
-                                      std::span<const std::uint8_t> skip) {
+  const std::size_t every = std::max<std::size_t>(1, structure.num_points() / std::max<std::size_t>(1, wanted));
   std::vector<std::uint8_t> out(skip.begin(), skip.end());
   out.resize(problem.observations.size(), 0);
   for (std::size_t i = 0; i < out.size(); ++i)
@@ -42,33 +39,37 @@ std::vector<std::uint8_t> thinned_out(const ReprojectionProblem& problem, std::s
   return out;
 }
 
-// L of BundleOptions::rig_prior, from the equations of every n-th point. Nullopt if they are singular with the prior.
-std::optional<Eigen::MatrixXd> deviation_after(const BundleOptions& options,
-                                               const ReducedSystem::RigEquations& of_images, std::size_t every) {
-  const double weight = static_cast<double>(every) / options.correlated_observations;
-  const Eigen::LLT<Eigen::MatrixXd> factor(weight * of_images.information + *options.rig_prior);
+// L of BundleOptions::rig_prior, from the factorised equations of all points with these blocks. Both the noise and the
+// information of inliers are biased by the bound of outliers. Nullopt if the equations are singular with the prior.
+std::optional<Eigen::MatrixXd> deviation_after(const BundleOptions& options, const RigBlocks& blocks,
+                                               const BundleEquations& equations) {
+  const ReducedSystem::RigEquations rig = equations.rig_equations();
+  const Eigen::MatrixXd of_images = rig.information - information_of_prior(blocks, equations.state().rig);
+  constexpr double kTruncation = kVarianceLeft / kFractionLeft;
+  const double weight = kTruncation * kTruncation / options.correlated_observations;
+  const Eigen::LLT<Eigen::MatrixXd> factor(weight * of_images + *options.rig_prior);
   if (factor.info() != Eigen::Success) return std::nullopt;
-  const Eigen::Index n = of_images.rhs.size();
+  const Eigen::Index n = rig.rhs.size();
   Eigen::MatrixXd L(n, n + 1);
   L.leftCols(n) = factor.matrixU().solve(Eigen::MatrixXd::Identity(n, n));
-  L.col(n) = factor.solve(weight * of_images.rhs);
+  L.col(n) = factor.solve(weight * rig.rhs);
   return L;
 }
 
 // The effect of the deviation of the rig on the poses. It is a ratio of two quantities that grow in the same way with
-// the number of points, so that some of them suffice.
+// the number of points, so that some of them suffice if the deviation is known.
 std::vector<std::optional<geometry::PoseUncertainty::Effect>> effects_of_rig(
     const ReprojectionProblem& problem, const BundleStructure& structure, const BundleOptions& options, Kernel kernel,
     const BundleState& state, const std::vector<double>& chi2, std::span<const std::uint8_t> skip) {
   const std::vector<std::optional<geometry::PoseUncertainty::Effect>> unknown(options.marginals.size());
-  const std::size_t every = thinning(structure);
-  const BundleStructure some = make_structure(problem, chi2, thinned_out(problem, every, skip));
+  const bool known = options.rig_deviation != nullptr;
+  const BundleStructure some = known ? make_structure(problem, chi2, thinned_out(problem, structure, skip)) : structure;
   const RigBlocks calibration = calibration_blocks(state.rig);
   BundleEquations equations(problem, some, calibration, kernel, options.dense_poses, state);
   equations.linearise();
   if (!equations.factorise()) return unknown;
-  if (options.rig_deviation) return equations.rig_effects(options.marginals, *options.rig_deviation);
-  const auto deviation = deviation_after(options, equations.rig_equations(), every);
+  if (known) return equations.rig_effects(options.marginals, *options.rig_deviation);
+  const auto deviation = deviation_after(options, calibration, equations);
   return deviation ? equations.rig_effects(options.marginals, *deviation) : unknown;
 }
 

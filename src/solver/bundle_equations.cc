@@ -329,4 +329,16 @@ std::optional<double> BundleEquations::solve(double damping) {
   return 0.5 * gain;
 }
 
+Eigen::MatrixXd information_of_prior(const RigBlocks& blocks, const RigValues& values) {
+  int size = 0, at = 0;
+  for (const auto& block : blocks) size += block->size();
+  Eigen::MatrixXd prior = Eigen::MatrixXd::Zero(size, size);
+  Eigen::VectorXd gradient = Eigen::VectorXd::Zero(size);
+  for (const auto& block : blocks) {
+    block->add_prior(values, prior.block(at, at, block->size(), block->size()), gradient.segment(at, block->size()));
+    at += block->size();
+  }
+  return prior;
+}
+
 }  // namespace bslam::solver

@@ -144,4 +144,7 @@ class BundleEquations {
   Eigen::VectorXd delta_;  // frames, then rig
 };
 
+// The information of the priors of the blocks at these values, as it is part of the information of the rig.
+Eigen::MatrixXd information_of_prior(const RigBlocks& blocks, const RigValues& values);
+
 }  // namespace bslam::solver

@@ -1,5 +1,6 @@
 #include "system/localiser.h"
 
+#include <algorithm>
 #include <stdexcept>
 #include <utility>
 
@@ -79,6 +80,16 @@ class PlacesOfThread final : public looping::PlaceRecogniser {
   const std::shared_ptr<looping::PlaceRecogniser> places_;
 };
 
+// Returns true if a camera has landmarks of the map in view of which hardly any is where the pose of the others expects
+// it: images under the names of other cameras, or another rig. A run would find out with the frames that follow.
+bool cameras_disagree(const tracking::FrameRecord& record) {
+  constexpr int kMinMatches = 30;
+  constexpr double kMinShare = 0.25;
+  return std::ranges::any_of(record.result.cameras, [](const tracking::CameraCounts& camera) {
+    return camera.matched >= kMinMatches && camera.inliers < kMinShare * camera.matched;
+  });
+}
+
 }  // namespace
 
 Localiser::Localiser(camera::Rig rig, const Config& config, map::BundledMap map, place::VocabularyPtr vocabulary,
@@ -101,6 +112,11 @@ Result<tracking::FrameRecord> Localiser::localise(const image::ImageBundle& imag
   Pipeline pipeline(rig_, cameras_, config_, masks_, std::move(relocaliser), keyframe_maker_);
   Pipeline::Outcome outcome = pipeline.process(widened(images, cameras_, rig_.size()), map);
   narrow(outcome.record, cameras_);
+  tracking::TrackResult& result = outcome.record.result;
+  if (result.status == tracking::TrackStatus::kTracking && cameras_disagree(outcome.record)) {
+    result.status = tracking::TrackStatus::kLost;
+    result.reason = tracking::LostReason::kUnstablePose;
+  }
   return std::move(outcome.record);
 }
 

@@ -28,7 +28,7 @@ execution::StageResult close_loop(looping::LoopCloser& closer, const LoopObserve
   return {std::move(draft), [observer, record](const map::CommitReport&) { observer(record); }};
 }
 
-// As the parameter of map_keyframe. A map that was loaded has been compared with its calibration.
+// The parameter of map_keyframe. A map that was loaded has been compared with its calibration.
 std::shared_ptr<const Eigen::MatrixXd> rig_prior(const calibration::CalibrationOptions& options,
                                                  const camera::Rig& calibrated, KeyframeId first) {
   if (options.refine == calibration::Refine::kFalse || calibrated.size() < 2 || first.index() > 0) return nullptr;

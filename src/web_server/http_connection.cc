@@ -77,6 +77,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
     }
     if (parser_.chunked()) return respond({411, "The request must state the length of its body.\n"});
     const std::uint64_t length = parser_.content_length().value_or(0);
+    if (length > 0 && head.method != "POST") return respond({400, "Only a POST request may have a body.\n"});
     if (length > all_.limits_.all_bodies_bytes - all_.body_bytes_)
       return respond({503, "Too many requests at once.\n", Response().type, {{"Retry-After", "1"}}});
     reserved_ = length;
@@ -103,9 +104,10 @@ class Connection : public std::enable_shared_from_this<Connection> {
   void pass_on() {
     stream_.expires_never();
     std::string body = std::move(parser_.get().body());
+    // The thread that answers keeps no reference: connections end in the thread of the server.
     all_.handler_.handle(head_of(parser_.get()), std::move(body),
-                         [self = shared_from_this(), executor = stream_.get_executor()](Response response) {
-                           asio::post(executor, [self, response = std::move(response)]() mutable {
+                         [self = shared_from_this(), executor = stream_.get_executor()](Response response) mutable {
+                           asio::post(executor, [self = std::move(self), response = std::move(response)]() mutable {
                              self->respond(std::move(response));
                            });
                          });

@@ -1,5 +1,6 @@
 #include "web_server/http_server.h"
 
+#include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/post.hpp>
 #include <future>
 #include <thread>
@@ -12,7 +13,8 @@ void RequestHandler::answered(const RequestHead&, int) {}
 
 class HttpServer::Implementation {
  public:
-  Implementation(const HttpLimits& limits, RequestHandler& handler) : connections_(limits, handler) {}
+  Implementation(const HttpLimits& limits, RequestHandler& handler)
+      : connections_(limits, handler), answers_(boost::asio::make_work_guard(connections_.context())) {}
   ~Implementation() {
     connections_.context().stop();
     if (thread_.joinable()) thread_.join();
@@ -48,6 +50,8 @@ class HttpServer::Implementation {
   }
 
   Connections connections_;
+  // Answers may come when nothing else is left to do for the server.
+  boost::asio::executor_work_guard<boost::asio::io_context::executor_type> answers_;
   std::thread thread_;
 };
 

@@ -117,6 +117,13 @@ TEST(PoseUncertainties, IncludeTheErrorOfACalibrationThatIsNotTestedYet) {
     geometry::Vector6d error;
     for (int i = 0; i < 6; ++i) error(i) = deviations(i) * random.normal();
     values.T_cam_rig[1] = values.T_cam_rig[1].perturbed(error);
+    for (std::size_t c = 0; c < 2; ++c) {  // fx, fy, cx, cy in pixels
+      const auto first = 6 + static_cast<Eigen::Index>(c) * intrinsics;
+      deviations.segment<4>(first).setConstant(0.5);
+      camera::ModelParameters changed = camera::parameters(values.models[c]);
+      for (int i = 0; i < 4; ++i) changed(i) += 0.5 * random.normal();
+      values.models[c] = camera::with_parameters(values.models[c], changed);
+    }
     world.map.set_rig(std::make_shared<const camera::Rig>(values.applied_to(world.map.rig())), nullptr);
     Selection selection = window(world.map, kKeyframes - 1, kKeyframes - 1, 1);
     selection.rig_prior = std::make_shared<const Eigen::MatrixXd>(deviations.cwiseAbs2().cwiseInverse().asDiagonal());

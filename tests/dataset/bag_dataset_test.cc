@@ -300,8 +300,9 @@ TEST_F(SmallBag, ImagesWithoutAStampAreNeitherUsedNorDescribed) {
   EXPECT_EQ(first.count, static_cast<std::uint64_t>(support::kSmallFrames));
   ASSERT_EQ(first.times.size(), static_cast<std::size_t>(support::kSmallFrames - 1));
   EXPECT_EQ(first.times.front(), support::kSmallStart);
-  EXPECT_EQ(first.notes, (std::vector<std::string>{"1 images have no time stamp",
-                                                   "1 image is missing at 20.0 Hz, the first after 0.050 s of it"}));
+  EXPECT_EQ(first.notes,
+            (std::vector<std::string>{"1 images have no time stamp",
+                                      "1 image is missing at 20.0 Hz, the first 0.050 s after its first image"}));
 }
 
 TEST_F(SmallBag, TheDescriptionNamesCamerasTimesAndWhatIsMissing) {

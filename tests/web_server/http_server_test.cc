@@ -6,6 +6,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <condition_variable>
 #include <mutex>
 #include <thread>
@@ -156,14 +157,20 @@ TEST(HttpServer, RefusedRequestsAreAnsweredBeforeTheirBody) {
 
 TEST(HttpServer, TheEndWaitsForAcceptedRequests) {
   Recorder recorder;
-  const auto server = start(recorder);
+  auto server = start(recorder);
   Client client(server->url());
   client.post("", 0);
   auto accepted = recorder.accepted();
-  std::jthread ending([&] { server->finish(std::chrono::minutes(1)); });
+  std::atomic<bool> ended = false;
+  std::jthread ending([&] {
+    server->finish(std::chrono::minutes(1));
+    ended = true;
+  });
+  EXPECT_FALSE(ended);
   accepted.second({200, "done"});
   accepted.second = {};
   ending.join();
+  server.reset();  // the answer must have been sent before
   EXPECT_TRUE(client.answer().ends_with("done"));
 }
 
