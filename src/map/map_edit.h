@@ -94,7 +94,7 @@ struct SetPoses {
   bool correction = false;  // a correction of the whole map: begins a gauge epoch
   // Factors by which lengths about a keyframe change (BundledMap::scale_keyframes); keyframes without one keep theirs.
   std::vector<std::pair<KeyframeId, double>> scale_changes = {};
-  // BundledKeyframe::uncertainty, of some of `keyframes`; the others keep theirs.
+  // BundledKeyframe::uncertainty of some keyframes, also of some that are not in `keyframes`; the others keep theirs.
   std::vector<std::pair<KeyframeId, geometry::PoseUncertainty>> uncertainties = {};
 };
 struct SetTwists {
