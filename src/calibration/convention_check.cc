@@ -8,6 +8,7 @@
 #include <optional>
 #include <set>
 
+#include "calibration/camera_views.h"
 #include "estimators/pair_rotation.h"
 #include "feature/descriptor_matching.h"
 #include "feature/extractor.h"
@@ -192,29 +193,6 @@ PairEvidence judge_pair(const camera::Rig& rig, std::size_t i, std::size_t j, st
 }
 
 namespace {
-
-struct View {
-  std::optional<TimeNs> time_ns = {};  // nullopt without an image
-  feature::Detections keypoints;
-};
-
-// Keypoints by camera and frame.
-std::vector<std::vector<View>> extract_views(const camera::Rig& rig, std::span<const image::ImageBundle> frames,
-                                             std::span<const image::Image> masks) {
-  std::vector<std::vector<View>> views(rig.size());
-  feature::Extractor extractor({});
-  for (const image::ImageBundle& bundle : frames) {
-    for (std::size_t c = 0; c < rig.size(); ++c) {
-      const image::CameraImage& image = bundle.images[c];
-      View& view = views[c].emplace_back();
-      if (image.state != image::ImageState::kPresent) continue;
-      view.time_ns = image.time_ns;
-      image::Pyramid pyramid;
-      extractor.extract(image.view(), masks[c].view(), rig.camera(c), pyramid, view.keypoints);
-    }
-  }
-  return views;
-}
 
 // The keypoints of a camera in mirrored images.
 std::vector<View> mirrored_views(const camera::Rig& rig, std::size_t camera,

@@ -3,19 +3,20 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cstdlib>
 #include <utility>
 
+#include "calibration/camera_views.h"
 #include "calibration/convention_check.h"
-#include "feature/extractor.h"
 
 namespace bslam::calibration {
 namespace {
 
+constexpr std::size_t kTriple = 3;  // frames that follow each other
+
 // Whether the images of each frame were taken together: within a quarter of the interval between frames. Images of
 // cameras that fire one after the other may be nearer to those of the next frame.
-bool are_together(const FrameTriple& triple) {
+bool are_together(std::span<const image::ImageBundle> triple) {
   const TimeNs interval_ns = (triple[2].time_ns - triple[0].time_ns) / 2;
   return std::ranges::all_of(triple, [&](const image::ImageBundle& frame) {
     return std::ranges::all_of(frame.images, [&](const image::CameraImage& image) {
@@ -24,40 +25,20 @@ bool are_together(const FrameTriple& triple) {
   });
 }
 
-// Keypoints of a camera in the frames of a triple; empty without an image.
-using Views = std::array<feature::Detections, 3>;
-
-std::vector<std::vector<Views>> extract_views(const camera::Rig& rig, std::span<const FrameTriple> triples,
-                                              std::span<const image::Image> masks) {
-  std::vector<std::vector<Views>> views(rig.size(), std::vector<Views>(triples.size()));
-  feature::Extractor extractor({});
-  image::Pyramid pyramid;
-  for (std::size_t t = 0; t < triples.size(); ++t) {
-    for (std::size_t f = 0; f < triples[t].size(); ++f) {
-      for (std::size_t c = 0; c < rig.size(); ++c) {
-        const image::CameraImage& image = triples[t][f].images[c];
-        if (image.state == image::ImageState::kPresent)
-          extractor.extract(image.view(), masks[c].view(), rig.camera(c), pyramid, views[c][t][f]);
-      }
-    }
-  }
-  return views;
-}
-
 // Matches of images of frame 1 of the first camera and of frame `of_second` of the second one.
-PairEvidence compare(const camera::Rig& rig, std::size_t i, std::size_t j, const std::vector<std::vector<Views>>& views,
+PairEvidence compare(const camera::Rig& rig, std::size_t i, std::size_t j, const std::vector<std::vector<View>>& views,
                      std::size_t of_second) {
   std::vector<feature::Detections> of_i, of_j;
-  for (std::size_t t = 0; t < views[i].size(); ++t) {
-    of_i.push_back(views[i][t][1]);
-    of_j.push_back(views[j][t][of_second]);
+  for (std::size_t first = 0; first < views[i].size(); first += kTriple) {
+    of_i.push_back(views[i][first + 1].keypoints);
+    of_j.push_back(views[j][first + of_second].keypoints);
   }
   return judge_pair(rig, i, j, of_i, of_j);
 }
 
 // What the pair shows, of its second camera; nullopt if images of the same frame fit as well.
 std::optional<LateCamera> judge(const camera::Rig& rig, std::size_t i, std::size_t j,
-                                const std::vector<std::vector<Views>>& views) {
+                                const std::vector<std::vector<View>>& views) {
   constexpr int kMinAgreeing = 60;
   constexpr double kGoodShare = 0.6, kClearly = 1.3, kMuchLarger = 0.15;
   const PairEvidence same = compare(rig, i, j, views, 1);
@@ -77,11 +58,13 @@ std::optional<LateCamera> judge(const camera::Rig& rig, std::size_t i, std::size
 
 }  // namespace
 
-std::optional<LateCamera> find_late_camera(const camera::Rig& rig, std::span<const FrameTriple> triples,
+std::optional<LateCamera> find_late_camera(const camera::Rig& rig, std::span<const image::ImageBundle> triples,
                                            std::span<const image::Image> masks) {
   constexpr double kMuchOverlap = 0.2;
-  if (!std::ranges::all_of(triples, are_together)) return std::nullopt;
-  const std::vector<std::vector<Views>> views = extract_views(rig, triples, masks);
+  for (std::size_t first = 0; first < triples.size(); first += kTriple) {
+    if (!are_together(triples.subspan(first, kTriple))) return std::nullopt;
+  }
+  const std::vector<std::vector<View>> views = extract_views(rig, triples, masks);
   std::vector<LateCamera> found;
   std::vector<int> votes(rig.size(), 0);
   for (std::size_t i = 0; i < rig.size(); ++i) {

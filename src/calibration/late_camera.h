@@ -2,7 +2,6 @@
 // other cameras took one frame before or after.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <optional>
 #include <span>
@@ -22,13 +21,11 @@ struct LateCamera {
   int matches = 0, agreeing = 0, matches_apart = 0, agreeing_apart = 0;
 };
 
-// Frames that follow each other.
-using FrameTriple = std::array<image::ImageBundle, 3>;
-
-// Compares images of overlapping cameras at the same frame and one frame apart. Only if the rig moves between frames
-// can it be told, and only if the images of a frame were taken together. If several pairs of cameras show a difference,
-// the camera of most of them is returned. `masks` as in check_conventions.
-std::optional<LateCamera> find_late_camera(const camera::Rig& rig, std::span<const FrameTriple> triples,
+// Compares images of overlapping cameras at the same frame and one frame apart. `triples`: frames in groups of three
+// that follow each other. Only if the rig moves between frames can it be told, and only if the images of a frame were
+// taken together. If several pairs of cameras show a difference, the camera of most of them is returned. `masks` as in
+// check_conventions.
+std::optional<LateCamera> find_late_camera(const camera::Rig& rig, std::span<const image::ImageBundle> triples,
                                            std::span<const image::Image> masks);
 
 // A warning that names the camera.

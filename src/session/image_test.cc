@@ -25,10 +25,10 @@ std::optional<calibration::LateCamera> late_camera(const dataset::Dataset& datas
   const std::size_t size = dataset.frames.size();
   if (!masks || dataset.rig.size() < 2 || size < 3) return std::nullopt;
   const std::size_t count = std::min(kTriples, size / 3);
-  std::vector<calibration::FrameTriple> triples(count);
+  std::vector<image::ImageBundle> triples;
   for (std::size_t t = 0; t < count; ++t) {
     const std::size_t first = (2 * t + 1) * (size - 2) / (2 * count);
-    for (std::size_t f = 0; f < 3; ++f) triples[t][f] = dataset::read_frame(dataset, first + f);
+    for (std::size_t f = 0; f < 3; ++f) triples.push_back(dataset::read_frame(dataset, first + f));
   }
   return calibration::find_late_camera(dataset.rig, triples, *masks);
 }
@@ -39,10 +39,8 @@ std::vector<calibration::CameraPair> contradicted_pairs(const dataset::Dataset& 
   if (!tested) return out;
   for (const calibration::PairEvidence& pair : *tested) {
     if (!calibration::shows_another_arrangement(pair)) continue;
-    const double overlap = std::max(dataset.rig.overlap_share(pair.first, pair.second),
-                                    dataset.rig.overlap_share(pair.second, pair.first));
     out.push_back(
-        {.first = pair.first, .second = pair.second, .overlap = overlap, .evidence = pair, .contradicted = true});
+        {.first = pair.first, .second = pair.second, .overlap = pair.overlap, .evidence = pair, .contradicted = true});
   }
   return out;
 }

@@ -48,6 +48,13 @@ double nees(const map::SimulatedMap& world, KeyframeId k) {
   return error.dot(keyframe.uncertainty.covariance().ldlt().solve(error)) / 6;
 }
 
+// Adds an error with the first six of these standard deviations to the extrinsics of camera 1.
+void displace_camera_1(const Eigen::VectorXd& deviations, Random& random, solver::RigValues& values) {
+  geometry::Vector6d error;
+  for (int i = 0; i < 6; ++i) error(i) = deviations(i) * random.normal();
+  values.T_cam_rig[1] = values.T_cam_rig[1].perturbed(error);
+}
+
 TEST(PoseUncertainties, MatchTheErrorsOfOneAdjustment) {
   double sum = 0;
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
@@ -87,9 +94,7 @@ TEST(PoseUncertainties, IncludeTheErrorOfTheCalibration) {
     Eigen::VectorXd deviations = Eigen::VectorXd::Zero(6 + 2 * intrinsics);
     deviations.head<6>() << 1e-3, 1e-3, 1e-3, 2e-3, 2e-3, 2e-3;
     Random random(seed, "calibration");
-    geometry::Vector6d error;
-    for (int i = 0; i < 6; ++i) error(i) = deviations(i) * random.normal();
-    values.T_cam_rig[1] = values.T_cam_rig[1].perturbed(error);
+    displace_camera_1(deviations, random, values);
     world.map.set_rig(std::make_shared<const camera::Rig>(values.applied_to(world.map.rig())),
                       std::make_shared<const Eigen::MatrixXd>(deviations.asDiagonal()));
     for (int k = 1; k < kKeyframes; ++k) adjust(window(world.map, k, 3, 3), kIndependent, world.map);
@@ -114,9 +119,7 @@ TEST(PoseUncertainties, IncludeTheErrorOfACalibrationThatIsNotTestedYet) {
     Eigen::VectorXd deviations = Eigen::VectorXd::Constant(6 + 2 * intrinsics, 1e-6);
     deviations.head<6>() << 1e-3, 1e-3, 1e-3, 2e-3, 2e-3, 2e-3;
     Random random(seed, "calibration");
-    geometry::Vector6d error;
-    for (int i = 0; i < 6; ++i) error(i) = deviations(i) * random.normal();
-    values.T_cam_rig[1] = values.T_cam_rig[1].perturbed(error);
+    displace_camera_1(deviations, random, values);
     for (std::size_t c = 0; c < 2; ++c) {  // fx, fy, cx, cy in pixels
       const auto first = 6 + static_cast<Eigen::Index>(c) * intrinsics;
       deviations.segment<4>(first).setConstant(0.5);
