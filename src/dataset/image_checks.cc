@@ -88,13 +88,19 @@ class FolderContents {
   bool has(const std::filesystem::path& file) {
     const std::filesystem::path folder = file.parent_path();
     const auto [found, is_new] = names_.try_emplace(folder);
-    std::error_code error;
-    for (std::filesystem::directory_iterator it(folder, error), end; is_new && !error && it != end; it.increment(error))
-      found->second.insert(it->path().filename().string());
+    if (is_new) found->second = names_in(folder);
     return found->second.contains(file.filename().string());
   }
 
  private:
+  static std::set<std::string> names_in(const std::filesystem::path& folder) {
+    std::set<std::string> names;
+    std::error_code error;
+    for (std::filesystem::directory_iterator it(folder, error), end; !error && it != end; it.increment(error))
+      names.insert(it->path().filename().string());
+    return names;
+  }
+
   std::map<std::filesystem::path, std::set<std::string>> names_;
 };
 
