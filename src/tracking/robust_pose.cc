@@ -119,6 +119,31 @@ double support(const map::BundledMap& map, const FrameMatches& matches,
   return sum;
 }
 
+bool lasting_landmarks_found(const map::BundledMap& map, std::span<const LandmarkId> visible,
+                             const FrameMatches& matches, std::span<const std::uint8_t> inlier) {
+  constexpr double kLasting = 0.5;  // s
+  constexpr double kAboutAsOften = 1.0 / 3.0;
+  constexpr std::size_t kEnough = 50;  // landmarks
+  std::vector<LandmarkId> found;
+  std::size_t i = 0;
+  for (const auto& of_camera : matches) {
+    for (const Match& m : of_camera) {
+      if (inlier[i++]) found.push_back(m.landmark);
+    }
+  }
+  std::ranges::sort(found);
+  struct Counts {
+    std::size_t visible = 0, found = 0;
+    double share() const { return visible > 0 ? static_cast<double>(found) / static_cast<double>(visible) : 0.0; }
+  } lasting, new_ones;
+  for (const LandmarkId l : visible) {
+    Counts& counts = time_observed(map, l) >= kLasting ? lasting : new_ones;
+    ++counts.visible;
+    counts.found += std::ranges::binary_search(found, l);
+  }
+  return lasting.visible < kEnough || lasting.share() >= kAboutAsOften * new_ones.share();
+}
+
 std::vector<std::uint8_t> agreeing_beyond_chance(const camera::Rig& rig,
                                                  std::span<const solver::PoseObservation> observations,
                                                  std::span<const double> window_px, const geometry::SE3& T_rig_world,

@@ -16,6 +16,12 @@ namespace bslam::tracking {
 double support(const map::BundledMap& map, const FrameMatches& matches,
                std::span<const solver::PoseObservation> observations, std::span<const std::uint8_t> inlier);
 
+// Whether landmarks that keyframes observed for long are found about as often as those observed for a short time.
+// `visible`: all that were searched for. What moves has been observed for a short time only: if that is what is found
+// and the rest is not, the pose is that relative to a moving object. True if too few of the former are visible to tell.
+bool lasting_landmarks_found(const map::BundledMap& map, std::span<const LandmarkId> visible,
+                             const FrameMatches& matches, std::span<const std::uint8_t> inlier);
+
 // Whether the map was started so short a time before the frame that no landmark has been observed for long.
 bool newly_started(const TrackInput& input, const frame::BundledFrame& frame);
 

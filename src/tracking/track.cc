@@ -309,6 +309,9 @@ TrackOutput track(const TrackInput& input, const frame::BundledFrame& frame, con
   if (!supported(fine.solution, count(fine.matches), options.min_inliers, options) &&
       !(fine.solution.ok && coarse_pose_confirmed(input, coarse, fine, options)))
     return lost(input.state, frame, LostReason::kUnstablePose);
+  const bool after_gap = to_seconds(frame.time_ns - input.state.time_ns) > kMaxPrediction_s;
+  if (after_gap && !lasting_landmarks_found(input.map, fine.visible, fine.matches, fine.solution.inlier))
+    return lost(input.state, frame, LostReason::kUnstablePose);
   return tracked(input, coarse, std::move(fine), options);
 }
 

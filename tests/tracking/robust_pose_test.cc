@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <functional>
+
 #include "estimators/pose_ransac.h"
 #include "tracking/camera_consensus.h"
 #include "tracking/simulated_tracker.h"
@@ -216,6 +218,58 @@ TEST_F(RobustPose, FewRightMatchesConfirmAPoseAndWrongOnesDoNot) {
   EXPECT_TRUE(confirmed());
   for (std::size_t i = 0; i < observations.size(); i += 4) mislead(i);
   EXPECT_FALSE(confirmed());
+}
+
+// Landmarks of the scene by the time for which keyframes observed them.
+class LastingLandmarks : public ::testing::Test {
+ protected:
+  LastingLandmarks() {
+    ThreadPool pool(2);
+    MatchSearch search =
+        find_landmarks(world.map, seen.frame, truth, world.map.landmark_ids(), {}, {.radius = 0.02}, pool);
+    visible = std::move(search.visible);
+    matches = std::move(search.found);
+  }
+
+  bool is_lasting(const Match& m) const { return is_lasting(m.landmark); }
+  bool is_lasting(LandmarkId l) const {
+    const auto of = world.map.observations(l);
+    const auto time_ns = [&](const map::Observation& o) { return world.map.keyframe(o.keyframe).frame->time_ns; };
+    return to_seconds(time_ns(of.back()) - time_ns(of.front())) >= 0.5;
+  }
+
+  std::vector<std::uint8_t> inliers(const std::function<bool(const Match&)>& is_inlier) const {
+    std::vector<std::uint8_t> out;
+    for (const auto& camera : matches) {
+      for (const Match& m : camera) out.push_back(is_inlier(m));
+    }
+    return out;
+  }
+
+  map::SimulatedMap world = true_map(simulator(synthetic::default_rig()), 1.0, 0.25);
+  synthetic::SimulatedFrame seen = world.sim.frame(FrameId(1), 0.1);
+  geometry::SE3 truth = seen.T_world_rig.inverse();
+  std::vector<LandmarkId> visible;
+  FrameMatches matches;
+};
+
+TEST_F(LastingLandmarks, AreFoundLikeOthersWhereNothingMoves) {
+  EXPECT_TRUE(lasting_landmarks_found(world.map, visible, matches, inliers([](const Match&) { return true; })));
+  int k = 0;  // of noise, few of both are found
+  EXPECT_TRUE(
+      lasting_landmarks_found(world.map, visible, matches, inliers([&](const Match&) { return k++ % 8 == 0; })));
+}
+
+TEST_F(LastingLandmarks, AreMissedWhereThePoseIsThatOfMovingObjects) {
+  int k = 0;
+  const auto moving = inliers([&](const Match& m) { return !is_lasting(m) || k++ % 20 == 0; });
+  EXPECT_FALSE(lasting_landmarks_found(world.map, visible, matches, moving));
+}
+
+TEST_F(LastingLandmarks, TellNothingIfFewAreVisible) {
+  std::erase_if(visible, [&](LandmarkId l) { return is_lasting(l) && l.value() % 128 != 0; });
+  EXPECT_TRUE(
+      lasting_landmarks_found(world.map, visible, matches, inliers([&](const Match& m) { return !is_lasting(m); })));
 }
 
 }  // namespace
