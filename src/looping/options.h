@@ -128,9 +128,9 @@ struct LoopOptions {
 
 struct RecoveryOptions {
   // Number of frames with enough features but without a pose after which a new submap is started.
-  int new_submap_after = 50;
+  int new_submap_after = 20;
   // A new submap is also started after this time without a pose, in s, if there were at least five such frames.
-  double new_submap_after_s = 5.0;
+  double new_submap_after_s = 2.0;
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {

@@ -31,8 +31,8 @@ struct TrackerOptions {
   bool correct_rig = true;     // before a map is started (tracking/start_correction.h)
   // The cameras of the rig that the run has, 0: all; the others belong to other rigs of the map, and never have images.
   std::size_t first_camera = 0, num_cameras = 0;
-  int new_submap_after = 50;  // number of frames with features but without a pose after which a new submap is started
-  double new_submap_after_s = 5.0;  // or time from the first of them, s, if there are a few
+  int new_submap_after = 20;  // number of frames with features but without a pose after which a new submap is started
+  double new_submap_after_s = 2.0;  // or time from the first of them, s, if there are a few
 };
 
 // Parameters for the extraction and bundling of the next frame, per camera.
