@@ -28,6 +28,17 @@ std::string_view convention_in_words(Convention convention) {
   return "with the two cameras exchanged and every transform inverted";
 }
 
+namespace {
+
+constexpr const char* kOrMirrored = ", or if the images of both cameras are mirrored left to right";
+
+// Whether mirrored images explain as much as the mistake that was found.
+bool may_be_mirrored(const PairEvidence& pair) {
+  return pair.verdict && *pair.verdict != Convention::kMirrored && pair.fits_as_well_mirrored(*pair.verdict);
+}
+
+}  // namespace
+
 std::string describe_pair(const PairEvidence& pair) {
   if (pair.mirrored) {
     return fmt::format(
@@ -59,8 +70,7 @@ std::string describe_pair(const PairEvidence& pair) {
   std::string text = fmt::format("{} of {} matches are consistent with the calibration {}", pair.with(*pair.verdict),
                                  pair.matches, convention_in_words(*pair.verdict));
   if (*pair.verdict != Convention::kAsGiven) {
-    if (*pair.verdict != Convention::kMirrored && pair.fits_as_well_mirrored(*pair.verdict))
-      text += fmt::format(", or {}", convention_in_words(Convention::kMirrored));
+    if (may_be_mirrored(pair)) text += kOrMirrored;
     return text + fmt::format("; {} with it as given", pair.with(Convention::kAsGiven));
   }
   if (pair.with(Convention::kAsGiven) < kGoodShare * pair.matches)
@@ -121,6 +131,7 @@ std::string describe_evidence(std::span<const PairEvidence> evidence) {
   std::string text = "test against the images:\n";
   std::set<std::size_t> mirrored;
   std::map<Convention, std::vector<std::string>> mistakes;  // pairs
+  std::set<Convention> or_mirrored;
   int fitting = 0, elsewhere = 0, exchanged = 0;
   for (const PairEvidence& pair : evidence) {
     text += fmt::format("  cameras {} and {}: {}\n", pair.first, pair.second, describe_pair(pair));
@@ -130,6 +141,7 @@ std::string describe_evidence(std::span<const PairEvidence> evidence) {
     if (pair.verdict == Convention::kAsGiven) ++fitting;
     if (pair.verdict && pair.verdict != Convention::kAsGiven) {
       mistakes[*pair.verdict].push_back(name_of(pair));
+      if (may_be_mirrored(pair)) or_mirrored.insert(*pair.verdict);
     }
   }
   for (const std::size_t camera : mirrored)
@@ -141,8 +153,9 @@ std::string describe_evidence(std::span<const PairEvidence> evidence) {
         fitting > 0 ? fmt::format("; {} of {} pairs are consistent as given", fitting, evidence.size()) : "";
     return text +
            fmt::format(
-               "warning: the images of cameras {} contradict the extrinsics; they are consistent with them {}{}\n",
-               fmt::join(pairs, ", "), convention_in_words(most->first), others);
+               "warning: the images of cameras {} contradict the extrinsics; they are consistent with them {}{}{}\n",
+               fmt::join(pairs, ", "), convention_in_words(most->first),
+               or_mirrored.contains(most->first) ? kOrMirrored : "", others);
   }
   if (exchanged > 0)
     return text + "warning: the images contradict the extrinsics; they are consistent with exchanged cameras\n";

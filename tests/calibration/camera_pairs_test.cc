@@ -61,6 +61,36 @@ TEST(CameraPairs, RevealExchangedCamerasAndInvertedTransforms) {
   EXPECT_FALSE(pairs[0].contradicted);
 }
 
+// A rig whose images are those of `rig` after mirroring. The principal points of the cameras are in the middle.
+camera::Rig mirrored(const camera::Rig& rig) {
+  const Eigen::Vector3d flip(-1, 1, 1);
+  std::vector<camera::RigCamera> cameras;
+  for (std::size_t c = 0; c < rig.size(); ++c) {
+    const geometry::SE3 T = rig.rig_from_cam(c);
+    const Eigen::Matrix3d R = flip.asDiagonal() * T.matrix3() * flip.asDiagonal();
+    const Eigen::Vector3d t = flip.asDiagonal() * T.translation();
+    cameras.push_back({rig.camera(c), rig.body_from_cam(0) * geometry::SE3(Eigen::Quaterniond(R), t)});
+  }
+  return camera::Rig(std::move(cameras));
+}
+
+// The refinement makes mirrored images of two cameras fit, so that they share many features.
+TEST(CameraPairs, RevealMirroredImagesThatWereMatched) {
+  const camera::Rig rig = turned_pair();
+  const map::SimulatedMap seen = seen_by(mirrored(rig), 0.8);
+  EXPECT_FALSE(tested(seen, rig, rig)[0].contradicted);
+  const auto suspected = test_pairs(seen.map, seen.map.keyframe_ids(), 0, rig, rig, true);
+  ASSERT_TRUE(suspected[0].evidence);
+  EXPECT_TRUE(suspected[0].mirrored()) << describe_pair(*suspected[0].evidence);
+  const map::SimulatedMap right = seen_by(rig, 0.8);
+  EXPECT_FALSE(test_pairs(right.map, right.map.keyframe_ids(), 0, rig, rig, true)[0].contradicted);
+  // An offset between the times that was estimated hides no pair.
+  std::vector<camera::RigCamera> later{{rig.camera(0u), rig.body_from_cam(0)}, {rig.camera(1u), rig.body_from_cam(1)}};
+  later[1].camera.time_offset_ns = 8'000'000;
+  const auto moved = test_pairs(seen.map, seen.map.keyframe_ids(), 0, rig, camera::Rig(later), true);
+  EXPECT_TRUE(moved[0].mirrored());
+}
+
 TEST(CameraPairs, OfDarkOrSeparateViewsAreNotAccused) {
   const camera::Rig rig = turned_pair();
   const std::array exchange = {1, 0};
