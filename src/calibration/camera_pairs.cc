@@ -95,9 +95,9 @@ TimeNs shift_of(const camera::Rig& given, const camera::Rig& final_rig, std::siz
 
 // Whether mirrored images explain clearly more matches of a pair than its calibration before and after refinement.
 bool is_mirrored(const PairEvidence& given, const PairEvidence& refined) {
-  constexpr double kNearlyAll = 0.8, kMuchMore = 0.15;  // shares of matches
+  constexpr double kMuchMore = 0.15;  // share of matches
   const int mirrored = given.agreeing[static_cast<std::size_t>(Convention::kMirrored)];
-  return given.verdict == Convention::kMirrored && mirrored >= kNearlyAll * given.matches &&
+  return given.verdict == Convention::kMirrored && mirrored >= kGoodShare * given.matches &&
          mirrored >= refined.agreeing[0] + kMuchMore * given.matches;
 }
 

@@ -15,11 +15,11 @@ namespace bslam::calibration {
 
 struct LateCamera {
   std::size_t camera = 0, reference = 0;
-  bool early = false;     // instead of late
-  std::string part = {};  // of the recording in which it is: "first half", "last quarter"; empty if in all of it
+  bool early = false;  // instead of late
   // Matches between the two cameras, and how many are consistent with the calibration: of images of the same frame, and
   // of those that are one frame apart.
   int matches = 0, agreeing = 0, matches_apart = 0, agreeing_apart = 0;
+  std::string part = {};  // of the recording in which it is: "first half", "last quarter"; empty if in all of it
 };
 
 // Compares images of overlapping cameras at the same frame and one frame apart. `triples`: frames in groups of three

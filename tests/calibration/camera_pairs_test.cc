@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "calibration/rig_warnings.h"
+#include "camera/stereo_rig.h"
 #include "geometry/so3.h"
 #include "mapping/simulated_map.h"
 
@@ -61,7 +62,14 @@ TEST(CameraPairs, RevealExchangedCamerasAndInvertedTransforms) {
   EXPECT_FALSE(pairs[0].contradicted);
 }
 
-// A rig whose images are those of `rig` after mirroring. The principal points of the cameras are in the middle.
+// The same with principal points in the middle of the images, so that mirrored images are those of another rig.
+camera::Rig centred_pair() {
+  const camera::Rig rig = turned_pair();
+  const camera::Camera camera = camera::stereo_rig().camera(0u);
+  return camera::Rig({{camera, rig.body_from_cam(0)}, {camera, rig.body_from_cam(1)}});
+}
+
+// The rig whose images are those of `rig` after mirroring.
 camera::Rig mirrored(const camera::Rig& rig) {
   const Eigen::Vector3d flip(-1, 1, 1);
   std::vector<camera::RigCamera> cameras;
@@ -76,7 +84,7 @@ camera::Rig mirrored(const camera::Rig& rig) {
 
 // The refinement makes mirrored images of two cameras fit, so that they share many features.
 TEST(CameraPairs, RevealMirroredImagesThatWereMatched) {
-  const camera::Rig rig = turned_pair();
+  const camera::Rig rig = centred_pair();
   const map::SimulatedMap seen = seen_by(mirrored(rig), 0.8);
   EXPECT_FALSE(tested(seen, rig, rig)[0].contradicted);
   const auto suspected = test_pairs(seen.map, seen.map.keyframe_ids(), 0, rig, rig, true);

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "calibration/convention_check.h"
+#include "calibration/late_camera.h"
 #include "calibration/rig_warnings.h"
 #include "camera/stereo_rig.h"
 #include "containers/mcap_writer.h"
