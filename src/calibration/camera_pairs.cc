@@ -21,14 +21,15 @@ const frame::CameraFrame& image_of(const map::BundledMap& map, KeyframeId k, std
   return map.keyframe(k).frame->cameras[camera];
 }
 
-// The keyframes in which both cameras have an image of the same time with enough keypoints.
+// The keyframes in which both cameras have an image of the same time with enough keypoints. `shift_ns`: how much the
+// map has moved the times of camera i against those of camera j.
 std::vector<KeyframeId> common_keyframes(const map::BundledMap& map, std::span<const KeyframeId> keyframes,
-                                         std::size_t i, std::size_t j) {
+                                         std::size_t i, std::size_t j, TimeNs shift_ns = 0) {
   std::vector<KeyframeId> out;
   for (const KeyframeId k : keyframes) {
     const frame::CameraFrame &a = image_of(map, k, i), &b = image_of(map, k, j);
     if (std::min(a.keypoints.size(), b.keypoints.size()) < kMinKeypoints) continue;
-    if (std::abs(a.time_ns - b.time_ns) <= frame::kTogetherNs) out.push_back(k);
+    if (std::abs(a.time_ns - b.time_ns - shift_ns) <= frame::kTogetherNs) out.push_back(k);
   }
   return out;
 }
@@ -87,6 +88,19 @@ CameraPair count_features(const map::BundledMap& map, std::span<const KeyframeId
 
 bool explained_by(const PairEvidence& evidence) { return evidence.agreeing[0] >= kMinExplained * evidence.matches; }
 
+// How much the times of a camera were moved by its refinement.
+TimeNs shift_of(const camera::Rig& given, const camera::Rig& final_rig, std::size_t camera) {
+  return final_rig.camera(camera).time_offset_ns - given.camera(camera).time_offset_ns;
+}
+
+// Whether mirrored images explain clearly more matches of a pair than its calibration before and after refinement.
+bool is_mirrored(const PairEvidence& given, const PairEvidence& refined) {
+  constexpr double kMuchMore = 0.15;  // share of matches
+  const int mirrored = given.agreeing[static_cast<std::size_t>(Convention::kMirrored)];
+  return given.verdict == Convention::kMirrored && mirrored >= kGoodShare * given.matches &&
+         mirrored >= refined.agreeing[0] + kMuchMore * given.matches;
+}
+
 }  // namespace
 
 bool CameraPair::hardly_matched() const {
@@ -104,7 +118,8 @@ bool shows_another_arrangement(const PairEvidence& evidence) {
 }
 
 std::vector<CameraPair> test_pairs(const map::BundledMap& map, std::span<const KeyframeId> keyframes,
-                                   std::size_t first_camera, const camera::Rig& given, const camera::Rig& final_rig) {
+                                   std::size_t first_camera, const camera::Rig& given, const camera::Rig& final_rig,
+                                   bool suspected) {
   std::vector<CameraPair> pairs;
   std::vector<std::vector<KeyframeId>> common;
   std::vector<std::uint8_t> sound(given.size(), 0);  // cameras with a pair that was matched
@@ -120,11 +135,19 @@ std::vector<CameraPair> test_pairs(const map::BundledMap& map, std::span<const K
   for (std::size_t p = 0; p < pairs.size(); ++p) {
     CameraPair& pair = pairs[p];
     const std::size_t i = pair.first, j = pair.second;
-    if (common[p].empty() || (sound[i] && sound[j])) continue;
+    // An offset between the times of the cameras may have been estimated, which images taken together do not have.
+    const bool for_mirrors_only = common[p].empty() || (sound[i] && sound[j]);
+    if (suspected && common[p].empty())
+      common[p] = common_keyframes(map, keyframes, first_camera + i, first_camera + j,
+                                   shift_of(given, final_rig, i) - shift_of(given, final_rig, j));
+    if (common[p].empty() || (for_mirrors_only && !suspected)) continue;
     const Views views = spread_views(map, common[p], first_camera + i, first_camera + j, images);
     pair.evidence = judge_pair(given, i, j, views.first, views.second);
-    pair.contradicted = shows_another_arrangement(*pair.evidence) &&
-                        !explained_by(judge_pair(final_rig, i, j, views.first, views.second));
+    const PairEvidence refined = judge_pair(final_rig, i, j, views.first, views.second);
+    const bool mirrored = is_mirrored(*pair.evidence, refined);
+    if (mirrored) pair.keyframes = static_cast<int>(common[p].size());
+    pair.contradicted =
+        mirrored || (!for_mirrors_only && shows_another_arrangement(*pair.evidence) && !explained_by(refined));
   }
   return pairs;
 }

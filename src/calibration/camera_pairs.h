@@ -24,6 +24,9 @@ struct CameraPair {
   std::optional<PairEvidence> evidence = {};
   bool contradicted = false;  // the evidence shows another arrangement of the cameras than the calibration
 
+  // Whether it is contradicted because the images of both cameras are mirrored.
+  bool mirrored() const { return contradicted && evidence && evidence->verdict == Convention::kMirrored; }
+
   double matched_share() const { return common > 0 ? matched / common : 0; }
   // Whether the views overlap and have features, but hardly any was matched.
   bool hardly_matched() const;
@@ -36,8 +39,10 @@ bool shows_another_arrangement(const PairEvidence& evidence);
 
 // All pairs of the cameras of a run, by keyframes `keyframes` of its map. `given` and `final_rig`: the calibration of
 // the run before and after its refinement, whose camera 0 is camera `first_camera` of the map. A pair is contradicted
-// only if both are. Takes some 10 ms per pair that was hardly matched.
+// only if both are. `suspected`: the images contradict the calibration, so that pairs that were matched are tested for
+// mirrored images, too: a refinement makes wrong matches of these fit. Takes some 10 ms per pair that is tested.
 std::vector<CameraPair> test_pairs(const map::BundledMap& map, std::span<const KeyframeId> keyframes,
-                                   std::size_t first_camera, const camera::Rig& given, const camera::Rig& final_rig);
+                                   std::size_t first_camera, const camera::Rig& given, const camera::Rig& final_rig,
+                                   bool suspected = false);
 
 }  // namespace bslam::calibration

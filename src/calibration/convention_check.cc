@@ -1,12 +1,7 @@
 #include "calibration/convention_check.h"
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
-
 #include <algorithm>
-#include <map>
 #include <optional>
-#include <set>
 
 #include "calibration/camera_views.h"
 #include "estimators/pair_rotation.h"
@@ -26,8 +21,6 @@ constexpr double kRatio = 0.85;       // largest ratio of best to second best de
 constexpr double kTolerancePx = 2.0;  // of calibration and feature localisation together
 constexpr int kMinAgreeing = 25;
 constexpr double kMinRatio = 0.4;     // minimum fraction of consistent matches; random matches reach a few per cent
-constexpr int kMany = 300;            // matches; with more than these some convention is expected to fit
-constexpr double kGoodRatio = 0.6;    // if the fraction of consistent matches is smaller, another pose is searched for
 constexpr double kClearly = 1.3;      // factor between numbers of consistent matches that counts as a clear difference
 constexpr double kNoBaseline = 1e-6;  // metres
 constexpr double kMinParallax = 0.005;  // rad, for the estimation of another pose
@@ -45,10 +38,12 @@ std::vector<PixelPair> match(const feature::Detections& a, const feature::Detect
   return pairs;
 }
 
-// A convention applied to a pair: the calibrations of the first and second image, and the transform between them.
+// A convention applied to a pair: the calibrations of the first and second image, the transform between them, and
+// whether both images are mirrored.
 struct Hypothesis {
   const camera::Camera *first, *second;
   SE3 T_second_first;
+  bool mirrored = false;
 };
 
 Hypothesis hypothesis_of(Convention convention, const camera::Rig& rig, std::size_t i, std::size_t j) {
@@ -64,6 +59,8 @@ Hypothesis hypothesis_of(Convention convention, const camera::Rig& rig, std::siz
       return {&ci, &cj, given.inverse()};
     case Convention::kSwapped:
       return {&cj, &ci, given.inverse()};
+    case Convention::kMirrored:
+      return {&ci, &cj, given, true};
     case Convention::kSwappedInverse:
       break;
   }
@@ -75,7 +72,19 @@ double tolerance_of(const camera::Camera& first, const camera::Camera& second) {
   return kTolerancePx * std::max(first.radians_per_pixel(), second.radians_per_pixel());
 }
 
+// The pairs in images that are mirrored, left to right.
+std::vector<PixelPair> mirrored(std::span<const PixelPair> pairs, const camera::Camera& first,
+                                const camera::Camera& second) {
+  std::vector<PixelPair> out(pairs.begin(), pairs.end());
+  for (PixelPair& pair : out) {
+    pair.a.x() = first.width - 1 - pair.a.x();
+    pair.b.x() = second.width - 1 - pair.b.x();
+  }
+  return out;
+}
+
 int count_agreeing(const Hypothesis& h, std::span<const PixelPair> pairs) {
+  if (h.mirrored) return count_agreeing({h.first, h.second, h.T_second_first}, mirrored(pairs, *h.first, *h.second));
   const double tolerance = tolerance_of(*h.first, *h.second);
   const Eigen::Vector3d t = h.T_second_first.translation();
   const bool apart = t.norm() > kNoBaseline;
@@ -136,7 +145,9 @@ std::optional<Convention> verdict_of(const PairEvidence& evidence) {
   const auto best = std::max_element(evidence.agreeing.begin(), evidence.agreeing.end());  // the first among equal ones
   if (*best < kMinAgreeing || *best < kMinRatio * evidence.matches) return std::nullopt;
   if (*best < kClearly * evidence.agreeing[0]) return Convention::kAsGiven;
-  return static_cast<Convention>(best - evidence.agreeing.begin());
+  const auto found = static_cast<Convention>(best - evidence.agreeing.begin());
+  const bool exchanged = found == Convention::kMirrored && evidence.fits_as_well_mirrored(Convention::kSwapped);
+  return exchanged ? Convention::kSwapped : found;
 }
 
 }  // namespace
@@ -146,20 +157,10 @@ bool OtherPose::is_another_arrangement() const {
   return rotated_deg > kRotation_deg || displaced_deg > kDisplacement_deg;
 }
 
-std::string_view convention_in_words(Convention convention) {
-  switch (convention) {
-    case Convention::kAsGiven:
-      return "as given";
-    case Convention::kInverse:
-      return "with every transform inverted (T_cam_body instead of T_body_cam)";
-    case Convention::kPairInverse:
-      return "with the transform between the two inverted, or the two cameras exchanged";
-    case Convention::kSwapped:
-      return "with the two cameras exchanged";
-    case Convention::kSwappedInverse:
-      break;
-  }
-  return "with the two cameras exchanged and every transform inverted";
+bool PairEvidence::fits_as_well_mirrored(Convention convention) const {
+  constexpr double kAsMany = 0.95;
+  const auto [less, more] = std::minmax({with(Convention::kMirrored), with(convention)});
+  return less >= kAsMany * more;
 }
 
 PairEvidence judge_pair(const camera::Rig& rig, std::size_t i, std::size_t j, std::span<const feature::Detections> of_i,
@@ -181,7 +182,7 @@ PairEvidence judge_pair(const camera::Rig& rig, std::size_t i, std::size_t j, st
   evidence.matches = static_cast<int>(all.size());
   evidence.verdict = verdict_of(evidence);
   const int fitting = *std::ranges::max_element(evidence.agreeing);
-  if (evidence.verdict && fitting >= kGoodRatio * evidence.matches) return evidence;
+  if (evidence.verdict && fitting >= kGoodShare * evidence.matches) return evidence;
   const auto clearly_better = [&](auto found) {
     if (found && found->agreeing < kClearly * fitting) found.reset();
     return found;
@@ -233,7 +234,7 @@ std::optional<MirroredCamera> find_mirrored(const camera::Rig& rig, const PairEv
     const PairEvidence again = judge_views(rig, pair.first, pair.second, c == pair.first ? reversed : views[pair.first],
                                            c == pair.second ? reversed : views[pair.second]);
     const int agreeing = again.agreeing[0];
-    if (again.verdict == Convention::kAsGiven && agreeing >= kMinMatches && agreeing >= kGoodRatio * again.matches &&
+    if (again.verdict == Convention::kAsGiven && agreeing >= kMinMatches && agreeing >= kGoodShare * again.matches &&
         agreeing >= kTimes * pair.agreeing[0])
       return MirroredCamera{c, again.matches, agreeing};
   }
@@ -244,7 +245,6 @@ std::optional<MirroredCamera> find_mirrored(const camera::Rig& rig, const PairEv
 
 std::vector<PairEvidence> check_conventions(const camera::Rig& rig, std::span<const image::ImageBundle> frames,
                                             std::span<const image::Image> masks) {
-  constexpr double kSomeOverlap = 0.2;
   const std::vector<std::vector<View>> views = extract_views(rig, frames, masks);
   std::vector<PairEvidence> evidence;
   for (std::size_t i = 0; i < rig.size(); ++i) {
@@ -255,116 +255,6 @@ std::vector<PairEvidence> check_conventions(const camera::Rig& rig, std::span<co
     }
   }
   return evidence;
-}
-
-std::string describe_pair(const PairEvidence& pair) {
-  const auto agreeing = [&](Convention c) { return pair.agreeing[static_cast<std::size_t>(c)]; };
-  if (pair.mirrored) {
-    return fmt::format(
-        "{} of {} matches are consistent with the calibration if the images of camera {} are mirrored left to "
-        "right; {} with it as given",
-        pair.mirrored->agreeing, pair.mirrored->matches, pair.mirrored->camera, agreeing(Convention::kAsGiven));
-  }
-  if (pair.exchanged) {
-    return fmt::format(
-        "{} of {} matches are consistent with the calibrations of {} and {} in place of those of the two cameras; {} "
-        "with the calibration as given",
-        pair.exchanged->agreeing, pair.matches, pair.exchanged->cameras[0], pair.exchanged->cameras[1],
-        agreeing(Convention::kAsGiven));
-  }
-  if (pair.other) {
-    return fmt::format(
-        "{} of {} matches are consistent with a pose of the second camera that is rotated by {:.1f} degrees from the "
-        "calibrated one, with a baseline whose direction differs by {:.0f} degrees; {} with the calibration as given",
-        pair.other->agreeing, pair.matches, pair.other->rotated_deg, pair.other->displaced_deg,
-        agreeing(Convention::kAsGiven));
-  }
-  if (pair.instants == 0) return "not tested: no images taken at the same time, so there is nothing to compare";
-  if (!pair.verdict && pair.matches > kMany)
-    return fmt::format("{} matches, but too few are consistent with any convention", pair.matches);
-  if (!pair.verdict)
-    return fmt::format("not tested: too few matches for a decision ({}); the calibrated views overlap by {:.0f} %",
-                       pair.matches, 100 * pair.overlap);
-  std::string text = fmt::format("{} of {} matches are consistent with the calibration {}", agreeing(*pair.verdict),
-                                 pair.matches, convention_in_words(*pair.verdict));
-  if (*pair.verdict != Convention::kAsGiven)
-    return text + fmt::format("; {} with it as given", agreeing(Convention::kAsGiven));
-  if (agreeing(Convention::kAsGiven) < kGoodRatio * pair.matches)
-    text += "; this is few: many matches are wrong, or the intrinsics are inaccurate";
-  return text;
-}
-
-namespace {
-
-// For rigs without a fault: the pairs and cameras that could not be tested.
-std::string unjudged(std::span<const PairEvidence> evidence) {
-  std::size_t pairs = 0;
-  std::set<std::size_t> cameras, judged;
-  for (const PairEvidence& pair : evidence) {
-    pairs += pair.verdict ? 0 : 1;
-    for (const std::size_t c : {pair.first, pair.second}) (pair.verdict ? judged : cameras).insert(c);
-  }
-  std::erase_if(cameras, [&](std::size_t c) { return judged.contains(c); });
-  if (pairs == 0) return "";
-  return fmt::format(
-      "; {} of {} pairs could not be tested{}", pairs, evidence.size(),
-      cameras.empty() ? "" : fmt::format(", among them all pairs of camera {}", fmt::join(cameras, ", ")));
-}
-
-// Pairs that should have been tested, since the calibrated views overlap.
-std::string warning_of_untested(std::span<const PairEvidence> evidence) {
-  constexpr double kMuchOverlap = 0.4;  // opposite fisheyes with less hardly match at the edges of their views
-  std::vector<std::string> untested;
-  std::size_t common = 0;
-  for (const PairEvidence& pair : evidence) {
-    if (pair.overlap < kMuchOverlap) continue;
-    ++common;
-    if (!pair.verdict && !pair.exchanged && !pair.other && !pair.mirrored)
-      untested.push_back(fmt::format("{} and {}", pair.first, pair.second));
-  }
-  if (untested.empty()) return "";
-  return fmt::format("warning: {} of {} pairs with much overlap could not be tested: cameras {}\n", untested.size(),
-                     common, fmt::join(untested, ", "));
-}
-
-}  // namespace
-
-std::string describe_evidence(std::span<const PairEvidence> evidence) {
-  std::string text = "test against the images:\n";
-  std::set<std::size_t> mirrored;
-  std::map<Convention, std::vector<std::string>> mistakes;  // pairs
-  int fitting = 0, elsewhere = 0, exchanged = 0;
-  for (const PairEvidence& pair : evidence) {
-    text += fmt::format("  cameras {} and {}: {}\n", pair.first, pair.second, describe_pair(pair));
-    if (pair.mirrored) mirrored.insert(pair.mirrored->camera);
-    elsewhere += pair.other ? 1 : 0;
-    exchanged += pair.exchanged ? 1 : 0;
-    if (pair.verdict == Convention::kAsGiven) ++fitting;
-    if (pair.verdict && pair.verdict != Convention::kAsGiven) {
-      mistakes[*pair.verdict].push_back(fmt::format("{} and {}", pair.first, pair.second));
-    }
-  }
-  for (const std::size_t camera : mirrored)
-    text += fmt::format("warning: the images of camera {} are mirrored left to right\n", camera);
-  if (!mistakes.empty()) {
-    const auto most = std::ranges::max_element(mistakes, {}, [](const auto& mistake) { return mistake.second.size(); });
-    const auto& pairs = most->second;
-    const std::string others =
-        fitting > 0 ? fmt::format("; {} of {} pairs are consistent as given", fitting, evidence.size()) : "";
-    return text +
-           fmt::format(
-               "warning: the images of cameras {} contradict the extrinsics; they are consistent with them {}{}\n",
-               fmt::join(pairs, ", "), convention_in_words(most->first), others);
-  }
-  if (exchanged > 0)
-    return text + "warning: the images contradict the extrinsics; they are consistent with exchanged cameras\n";
-  if (elsewhere > 0) return text + "warning: the images contradict the extrinsics, and no common mistake explains it\n";
-  text += warning_of_untested(evidence);
-  if (fitting == 0) return text + "  the extrinsics could not be tested\n";
-  text += "  the extrinsics are consistent with the images" + unjudged(evidence) + "\n";
-  return text +
-         "  focal lengths and distortion are hardly tested by pairs of images: `bslam run` estimates them from the "
-         "motion of the rig\n";
 }
 
 }  // namespace bslam::calibration

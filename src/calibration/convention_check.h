@@ -21,12 +21,13 @@ namespace bslam::calibration {
 // Interpretations of the transforms of a calibration file.
 enum class Convention {
   kAsGiven,
-  kInverse,        // every transform is inverted: the file holds T_cam_body instead of T_body_cam
-  kPairInverse,    // the transform between the two cameras is inverted
-  kSwapped,        // the images or the calibrations of the two cameras are exchanged
-  kSwappedInverse  // exchanged cameras and inverted transforms
+  kInverse,         // every transform is inverted: the file holds T_cam_body instead of T_body_cam
+  kPairInverse,     // the transform between the two cameras is inverted
+  kSwapped,         // the images or the calibrations of the two cameras are exchanged
+  kSwappedInverse,  // exchanged cameras and inverted transforms
+  kMirrored         // the images of both cameras are mirrored, left to right
 };
-constexpr int kConventions = 5;
+constexpr int kConventions = 6;
 std::string_view convention_in_words(Convention convention);
 
 // A relative pose of the two cameras that is consistent with clearly more matches than any convention.
@@ -66,7 +67,18 @@ struct PairEvidence {
   std::optional<OtherCalibrations> exchanged = {};
   std::optional<OtherPose> other = {};
   std::optional<MirroredCamera> mirrored = {};
+
+  int with(Convention convention) const { return agreeing[static_cast<std::size_t>(convention)]; }
+  bool is_judged() const { return verdict || exchanged || other || mirrored; }
+  // Whether as many matches are consistent if the images of both cameras are mirrored: to cameras side by side and
+  // without rotation, exchanged and mirrored images look the same.
+  bool fits_as_well_mirrored(Convention convention) const;
 };
+
+// If the share of consistent matches is smaller, another pose of the cameras is searched for.
+constexpr double kGoodShare = 0.6;
+// Cameras whose views overlap by less (PairEvidence::overlap) are hardly expected to have matches.
+constexpr double kSomeOverlap = 0.2;
 
 // Tests the pair (i, j) with keypoints of images taken at the same times. `of_i` and `of_j` have one entry per frame.
 PairEvidence judge_pair(const camera::Rig& rig, std::size_t i, std::size_t j, std::span<const feature::Detections> of_i,
@@ -81,7 +93,8 @@ std::vector<PairEvidence> check_conventions(const camera::Rig& rig, std::span<co
 // The evidence on a pair in words, such as "90 of 100 matches are consistent with the calibration as given".
 std::string describe_pair(const PairEvidence& pair);
 
-// The report for users: one line per pair and a conclusion. Warns of pairs with much overlap that could not be tested.
+// The report for users: one line per pair and a conclusion, which says how many pairs could be tested and why the
+// others could not. Warns of pairs with much overlap that could not be tested.
 std::string describe_evidence(std::span<const PairEvidence> evidence);
 
 }  // namespace bslam::calibration

@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdlib>
+#include <string_view>
 #include <utility>
 
 #include "calibration/camera_views.h"
@@ -13,6 +15,12 @@ namespace bslam::calibration {
 namespace {
 
 constexpr std::size_t kTriple = 3;  // frames that follow each other
+
+// The triples from `begin` to `end`.
+struct Part {
+  std::string_view name;
+  std::size_t begin, end;
+};
 
 // Whether the images of each frame were taken together: within a quarter of the interval between frames. Images of
 // cameras that fire one after the other may be nearer to those of the next frame.
@@ -27,50 +35,51 @@ bool are_together(std::span<const image::ImageBundle> triple) {
 
 // Matches of images of frame 1 of the first camera and of frame `of_second` of the second one.
 PairEvidence compare(const camera::Rig& rig, std::size_t i, std::size_t j, const std::vector<std::vector<View>>& views,
-                     std::size_t of_second) {
+                     const Part& part, std::size_t of_second) {
   std::vector<feature::Detections> of_i, of_j;
-  for (std::size_t first = 0; first < views[i].size(); first += kTriple) {
-    of_i.push_back(views[i][first + 1].keypoints);
-    of_j.push_back(views[j][first + of_second].keypoints);
+  for (std::size_t t = part.begin; t < part.end; ++t) {
+    of_i.push_back(views[i][kTriple * t + 1].keypoints);
+    of_j.push_back(views[j][kTriple * t + of_second].keypoints);
   }
   return judge_pair(rig, i, j, of_i, of_j);
 }
 
 // What the pair shows, of its second camera; nullopt if images of the same frame fit as well.
 std::optional<LateCamera> judge(const camera::Rig& rig, std::size_t i, std::size_t j,
-                                const std::vector<std::vector<View>>& views) {
+                                const std::vector<std::vector<View>>& views, const Part& part) {
   constexpr int kMinAgreeing = 60;
   constexpr double kGoodShare = 0.6, kClearly = 1.3, kMuchLarger = 0.15;
-  const PairEvidence same = compare(rig, i, j, views, 1);
+  const PairEvidence same = compare(rig, i, j, views, part, 1);
   if (same.matches < kMinAgreeing) return std::nullopt;
   const auto share = [](const PairEvidence& e) { return e.matches > 0 ? 1.0 * e.agreeing[0] / e.matches : 0.0; };
   std::optional<LateCamera> out;
   for (const std::size_t frame : {0u, 2u}) {
-    const PairEvidence apart = compare(rig, i, j, views, frame);
+    const PairEvidence apart = compare(rig, i, j, views, part, frame);
     if (apart.agreeing[0] < kMinAgreeing || apart.matches > 2 * same.matches ||
         share(apart) < std::max(kGoodShare, share(same) + kMuchLarger) ||
         apart.agreeing[0] < kClearly * same.agreeing[0] || (out && apart.agreeing[0] < out->agreeing_apart))
       continue;
-    out = LateCamera{j, i, frame == 0, same.matches, same.agreeing[0], apart.matches, apart.agreeing[0]};
+    out = LateCamera{.camera = j,
+                     .reference = i,
+                     .early = frame == 0,
+                     .matches = same.matches,
+                     .agreeing = same.agreeing[0],
+                     .matches_apart = apart.matches,
+                     .agreeing_apart = apart.agreeing[0]};
   }
   return out;
 }
 
-}  // namespace
-
-std::optional<LateCamera> find_late_camera(const camera::Rig& rig, std::span<const image::ImageBundle> triples,
-                                           std::span<const image::Image> masks) {
+// The camera that most pairs show to be late in a part of the triples.
+std::optional<LateCamera> find_in_part(const camera::Rig& rig, const std::vector<std::vector<View>>& views,
+                                       const Part& part) {
   constexpr double kMuchOverlap = 0.2;
-  for (std::size_t first = 0; first < triples.size(); first += kTriple) {
-    if (!are_together(triples.subspan(first, kTriple))) return std::nullopt;
-  }
-  const std::vector<std::vector<View>> views = extract_views(rig, triples, masks);
   std::vector<LateCamera> found;
   std::vector<int> votes(rig.size(), 0);
   for (std::size_t i = 0; i < rig.size(); ++i) {
     for (std::size_t j = i + 1; j < rig.size(); ++j) {
       if (std::max(rig.overlap_share(i, j), rig.overlap_share(j, i)) < kMuchOverlap) continue;
-      const auto late = judge(rig, i, j, views);
+      const auto late = judge(rig, i, j, views, part);
       if (!late) continue;
       found.push_back(*late);
       ++votes[i];
@@ -86,15 +95,38 @@ std::optional<LateCamera> find_late_camera(const camera::Rig& rig, std::span<con
     std::swap(out.camera, out.reference);
     out.early = !out.early;
   }
+  out.part = part.name;
   return out;
+}
+
+}  // namespace
+
+std::optional<LateCamera> find_late_camera(const camera::Rig& rig, std::span<const image::ImageBundle> triples,
+                                           std::span<const image::Image> masks) {
+  for (std::size_t first = 0; first < triples.size(); first += kTriple) {
+    if (!are_together(triples.subspan(first, kTriple))) return std::nullopt;
+  }
+  const std::vector<std::vector<View>> views = extract_views(rig, triples, masks);
+  const std::size_t count = triples.size() / kTriple;
+  const std::array<Part, 5> parts = {{{"", 0, count},
+                                      {"first half", 0, count / 2},
+                                      {"last half", count - count / 2, count},
+                                      {"first quarter", 0, count / 4},
+                                      {"last quarter", count - count / 4, count}}};
+  for (const Part& part : parts) {
+    if (auto found = find_in_part(rig, views, part)) return found;
+  }
+  return std::nullopt;
 }
 
 std::string describe_late_camera(const LateCamera& late, const std::string& camera, const std::string& reference) {
   return fmt::format(
-      "{}: its images are about one frame {} compared with {}: {} of {} matches of images that are one frame apart are "
+      "{}: its images are about one frame {} compared with {}{}: {} of {} matches of images that are one frame apart "
+      "are "
       "consistent with the calibration, and {} of {} of the same frame: check the numbers or time stamps of its images",
-      camera, late.early ? "early" : "late", reference, late.agreeing_apart, late.matches_apart, late.agreeing,
-      late.matches);
+      camera, late.early ? "early" : "late", reference,
+      late.part.empty() ? "" : fmt::format(" in the {} of the recording", late.part), late.agreeing_apart,
+      late.matches_apart, late.agreeing, late.matches);
 }
 
 }  // namespace bslam::calibration

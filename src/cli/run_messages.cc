@@ -48,10 +48,15 @@ std::string doubt_text(const session::RunRecord& record) {
     if (pair.contradicted != record.calibration.foreign_images()) continue;
     text += fmt::format("{}{} and {}", text.empty() ? "" : ", ", record.cameras[pair.first].name,
                         record.cameras[pair.second].name);
-    if (pair.keyframes > 0)
+    if (pair.mirrored())
+      text += " show it mirrored left to right";
+    else if (pair.keyframes > 0)
       text += fmt::format(" share {:.1f} % of the features in their common view", 100 * pair.matched_share());
   }
   if (record.calibration.foreign_images()) return text;
+  if (const auto& late = record.calibration.late)
+    text += fmt::format("{}{} is about one frame {}", text.empty() ? "" : ", ", record.cameras[late->camera].name,
+                        late->early ? "early" : "late");
   for (const std::size_t c : record.calibration.disagreeing)
     text +=
         fmt::format("{}{} shows other things than the map predicts", text.empty() ? "" : ", ", record.cameras[c].name);

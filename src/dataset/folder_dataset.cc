@@ -97,8 +97,16 @@ Result<CameraImages> with_named_times(const TimeList& list, const std::vector<fs
 
 // Images whose numbers are multiplied by the interval of a rate. A list of times is not used then.
 Result<CameraImages> at_rate(Result<NamedImages> named, const CameraFolder& camera, const fs::path& data) {
+  constexpr TimeNs kNoCount = 1'000'000'000;  // seconds since 1970 are more
   if (!named) return named.error();
   CameraImages out = from_names(*std::move(named), camera.images);
+  const TimeNs first = out.list.images.empty() ? 0 : out.list.images.front().time_ns;
+  if (!out.unit_is_known && first >= kNoCount) {
+    out.list.warnings.push_back(
+        fmt::format("{}: {} and the others are taken for the numbers of images, since --rate was given; if they are "
+                    "time stamps, replace it by --stamp-unit, such as --stamp-unit s",
+                    camera.images.string(), first));
+  }
   const auto list = find_time_list(camera.images, data);
   if (list && *list && !out.unit_is_known)
     out.list.warnings.push_back((*list)->string() + ": not used, since --rate says when the images were taken");

@@ -36,6 +36,13 @@ std::vector<const image_files::ImageFile*> samples_of(const Images& images) {
   return samples;
 }
 
+// Between the images of most of a recording: longer ones are gaps, and shorter ones are those of two mixed series.
+TimeNs usual_interval(std::vector<TimeNs> intervals) {
+  const auto at = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() * 4 / 5);
+  std::ranges::nth_element(intervals, at);
+  return *at;
+}
+
 bool is_flat(const image::Image& image) {
   for (int y = 0; y < image.height(); ++y) {
     if (!std::all_of(image.row(y), image.row(y) + image.width(), [&](auto v) { return v == *image.row(0); }))
@@ -166,6 +173,32 @@ Status check_different_images(const std::vector<Images>& images) {
     }
   }
   return {};
+}
+
+std::optional<std::string> interleaved_warning(const Images& images) {
+  constexpr std::size_t kLeast = 10;  // images in a row that alternate, and usual intervals elsewhere
+  if (images.size() < 2 * kLeast) return std::nullopt;
+  std::vector<TimeNs> intervals;
+  for (std::size_t k = 1; k < images.size(); ++k) intervals.push_back(images[k].time_ns - images[k - 1].time_ns);
+  const TimeNs usual = usual_interval(intervals);
+  const auto near = [&](TimeNs a, TimeNs b) { return 20 * std::abs(a - b) <= usual; };
+  std::size_t regular = 0, run = 0, longest = 0, end = 0;
+  for (std::size_t k = 0; k + 1 < intervals.size(); ++k) {
+    const TimeNs a = intervals[k], b = intervals[k + 1];
+    regular += near(a, usual) ? 1 : 0;
+    const bool alternates = near(a + b, usual) && !near(a, b) && (run == 0 || near(b, intervals[k - 1]));
+    run = alternates ? run + 1 : 0;
+    if (run > longest) longest = run, end = k + 1;
+  }
+  if (longest < kLeast || regular < kLeast) return std::nullopt;
+  const TimeNs begin_ns = images[end - longest].time_ns, first_ns = images.front().time_ns;
+  return fmt::format(
+      "{}: from {:.3f} to {:.3f} s there are two images in each interval of {:.1f} ms, {:.1f} and {:.1f} ms apart, as "
+      "if "
+      "the clock was set back during the recording, or two recordings were mixed: poses there are wrong then",
+      image_files::source_of(images.front()), to_seconds(begin_ns - first_ns),
+      to_seconds(images[end + 1].time_ns - first_ns), 1e3 * to_seconds(usual), 1e3 * to_seconds(intervals[end - 1]),
+      1e3 * to_seconds(intervals[end]));
 }
 
 std::optional<std::string> unreadable_note(const Images& images) {

@@ -26,6 +26,10 @@ std::string resolution_hint(int width, int height, const camera::Camera& camera)
 // Says how many images are listed but not there, and which is the first; nullopt if none are missing, or all.
 std::optional<std::string> absent_warning(const std::vector<image_files::ImageFile>& images);
 
+// Warns of a part of the recording in which two series of images, each of the usual interval, alternate: names that are
+// time stamps do not tell the order in which images were taken if the clock was set back. nullopt if there is none.
+std::optional<std::string> interleaved_warning(const std::vector<image_files::ImageFile>& images);
+
 // Checks that no two cameras have the same images: several of their first ones in a row, except those of one value
 // everywhere, which may be equal by chance.
 Status check_different_images(const std::vector<std::vector<image_files::ImageFile>>& images);

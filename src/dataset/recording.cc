@@ -1,6 +1,10 @@
 #include "dataset/recording.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
+#include <optional>
 #include <system_error>
 
 #include "base/split.h"
@@ -12,12 +16,52 @@ namespace {
 
 namespace fs = std::filesystem;
 
-Result<DatasetFormat> detect_format(const fs::path& folder) {
+std::optional<DatasetFormat> known_format(const fs::path& folder) {
   if (looks_like_euroc(folder)) return DatasetFormat::kEuroc;
   if (looks_like_kitti(folder) || looks_like_kitti_raw(folder)) return DatasetFormat::kKitti;
   if (looks_like_folder(folder)) return DatasetFormat::kFolder;
   if (looks_like_bag(folder)) return DatasetFormat::kBag;
   if (has_folders_of_images(folder)) return DatasetFormat::kFolder;
+  return std::nullopt;
+}
+
+std::vector<fs::path> folders_in(const fs::path& folder) {
+  constexpr std::size_t kMost = 100;  // that are looked at
+  std::vector<fs::path> out;
+  std::error_code error;
+  for (fs::directory_iterator it(folder, error), end; !error && it != end && out.size() < kMost; it.increment(error)) {
+    std::error_code unreadable;
+    if (it->is_directory(unreadable)) out.push_back(it->path());
+  }
+  std::ranges::sort(out);
+  return out;
+}
+
+// Folders of recordings one or two levels below, relative to `folder`.
+std::vector<std::string> recordings_below(const fs::path& folder) {
+  std::vector<std::string> out;
+  for (const fs::path& outer : folders_in(folder)) {
+    std::vector<fs::path> tried = {outer};
+    if (!known_format(outer)) tried = folders_in(outer);
+    for (const fs::path& inner : tried) {
+      if (known_format(inner)) out.push_back(inner.lexically_relative(folder).string());
+    }
+  }
+  return out;
+}
+
+Result<DatasetFormat> detect_format(const fs::path& folder) {
+  constexpr std::size_t kShown = 3;
+  if (const auto known = known_format(folder)) return *known;
+  std::vector<std::string> below = recordings_below(folder);
+  if (!below.empty()) {
+    const std::size_t more = below.size() - std::min(below.size(), kShown);
+    below.resize(below.size() - more);
+    return Error{folder.string(), "",
+                 fmt::format("no recording, but folders that look like one in {}{}", fmt::join(below, ", "),
+                             more > 0 ? fmt::format(" and {} more", more) : ""),
+                 "one of them: " + (folder / below.front()).string()};
+  }
   return Error{
       folder.string(), "", "no data set of a known format",
       "mav0/camN/data.csv (euroc), image_N with times.txt or image_NN with timestamps.txt (kitti), a folder of "

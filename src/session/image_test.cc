@@ -20,7 +20,7 @@ Result<std::vector<calibration::PairEvidence>> test_against_images(const dataset
 }
 
 std::optional<calibration::LateCamera> late_camera(const dataset::Dataset& dataset) {
-  constexpr std::size_t kTriples = 6;
+  constexpr std::size_t kTriples = 12;
   const auto masks = image_decoding::read_masks(dataset.rig);
   const std::size_t size = dataset.frames.size();
   if (!masks || dataset.rig.size() < 2 || size < 3) return std::nullopt;
@@ -33,13 +33,14 @@ std::optional<calibration::LateCamera> late_camera(const dataset::Dataset& datas
   return calibration::find_late_camera(dataset.rig, triples, *masks);
 }
 
-std::vector<calibration::CameraPair> contradicted_pairs(const dataset::Dataset& dataset) {
-  std::vector<calibration::CameraPair> out;
+PairsWithoutMap pairs_without_map(const dataset::Dataset& dataset) {
+  PairsWithoutMap out;
   const auto tested = test_against_images(dataset);
   if (!tested) return out;
   for (const calibration::PairEvidence& pair : *tested) {
+    out.as_given += pair.verdict == calibration::Convention::kAsGiven;
     if (!calibration::shows_another_arrangement(pair)) continue;
-    out.push_back(
+    out.contradicted.push_back(
         {.first = pair.first, .second = pair.second, .overlap = pair.overlap, .evidence = pair, .contradicted = true});
   }
   return out;

@@ -14,11 +14,17 @@ namespace bslam::session {
 // Tests every pair of cameras with some frames spread over the data set. Errors: masks that cannot be read.
 Result<std::vector<calibration::PairEvidence>> test_against_images(const dataset::Dataset& dataset);
 
-// The camera whose images are one frame late, found with some frames spread over the data set that follow each other.
+// The camera whose images are one frame late, in the whole data set or in a half or quarter at one of its ends; found
+// with some frames spread over it that follow each other.
 std::optional<calibration::LateCamera> late_camera(const dataset::Dataset& dataset);
 
-// The pairs of cameras whose images show another arrangement than the calibration. For a run that started no map; the
-// pairs have no keyframes. Empty for a data set without frames, such as live cameras.
-std::vector<calibration::CameraPair> contradicted_pairs(const dataset::Dataset& dataset);
+// What some images show of a calibration with which no map was started.
+struct PairsWithoutMap {
+  std::vector<calibration::CameraPair> contradicted;  // whose images show another arrangement; without keyframes
+  int as_given = 0;                                   // number of pairs whose images agree with the calibration
+};
+
+// Empty for a data set without frames, such as live cameras.
+PairsWithoutMap pairs_without_map(const dataset::Dataset& dataset);
 
 }  // namespace bslam::session

@@ -70,6 +70,12 @@ double inconsistent_fraction(const CameraRecord& camera) {
   return all_s > 0 ? inconsistent_s / all_s : 0.0;
 }
 
+bool was_inconsistent(const CameraRecord& camera) {
+  return std::ranges::any_of(camera.states, [](const CameraInterval& interval) {
+    return interval.status.reason == tracking::CameraReason::kInconsistent;
+  });
+}
+
 // Whether the scale has no foundation: of the cameras with images, all but one have contradicted that one nearly from
 // the start.
 bool single_camera_agrees(const RunRecord& record) {
@@ -94,15 +100,21 @@ void add_calibration(const RecordInput& input, RunRecord& record) {
   const map::MapSnapshot map = input.system.snapshot();
   std::vector<KeyframeId> keyframes = map->keyframe_ids();
   std::erase_if(keyframes, [&](KeyframeId k) { return k < input.system.first_keyframe(); });
-  calibration.pairs =
-      calibration::test_pairs(*map, keyframes, input.system.first_camera(), input.dataset.rig, input.system.rig());
+  const bool suspected = calibration.estimate.verdict == calibration::Verdict::kInconsistent;
+  calibration.pairs = calibration::test_pairs(*map, keyframes, input.system.first_camera(), input.dataset.rig,
+                                              input.system.rig(), suspected);
   std::erase_if(calibration.pairs,
                 [](const calibration::CameraPair& p) { return !p.contradicted && !p.hardly_matched(); });
-  if (input.complete && never_started(record)) calibration.pairs = contradicted_pairs(input.dataset);
+  if (input.complete && never_started(record)) {
+    PairsWithoutMap found = pairs_without_map(input.dataset);
+    calibration.pairs = std::move(found.contradicted);
+    calibration.pairs_as_given = found.as_given;
+  }
   for (std::size_t c = 0; c < record.cameras.size(); ++c) {
     if (inconsistent_fraction(record.cameras[c]) > 0.5) calibration.disagreeing.push_back(c);
   }
-  if (input.complete && is_contradicted(calibration)) calibration.late = late_camera(input.dataset);
+  if (input.complete && (is_contradicted(calibration) || std::ranges::any_of(record.cameras, was_inconsistent)))
+    calibration.late = late_camera(input.dataset);
   calibration.accept_estimate(input.complete, input.system.calibration_refined());
   for (CameraRecord& camera : record.cameras) {
     if (camera.extrinsics) camera.extrinsics->refined = calibration.refined;

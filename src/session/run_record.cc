@@ -12,7 +12,7 @@ FrameOutcome RunFrame::outcome() const {
 }
 
 void CalibrationRecord::accept_estimate(bool complete, bool replaced) {
-  applies = complete && estimate.done && pairs.empty() && disagreeing.empty();
+  applies = complete && estimate.done && pairs.empty() && disagreeing.empty() && !late;
   refined = applies && replaced;
 }
 
@@ -23,7 +23,7 @@ bool CalibrationRecord::foreign_images() const {
 calibration::Verdict CalibrationRecord::verdict() const {
   if (foreign_images()) return calibration::Verdict::kInconsistent;
   if (estimate.verdict != calibration::Verdict::kConsistent) return estimate.verdict;
-  return pairs.empty() && disagreeing.empty() ? estimate.verdict : calibration::Verdict::kUnknown;
+  return pairs.empty() && disagreeing.empty() && !late ? estimate.verdict : calibration::Verdict::kUnknown;
 }
 
 double MemoryReport::sum_mb() const {

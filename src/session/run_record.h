@@ -82,9 +82,11 @@ struct CalibrationRecord {
   double excess_bound = 0;  // of estimate.excess_error, above which the images contradict the calibration
   std::vector<calibration::CameraPair> pairs =
       {};                        // that are contradicted or hardly matched; without keyframes if no map was started
+  int pairs_as_given = 0;        // if no map was started: pairs whose images agree with the calibration
   bool scale_unfounded = false;  // no two cameras agree on which the scale could be based
-  std::vector<std::size_t> disagreeing = {};         // cameras that were inconsistent for most of the run
-  std::optional<calibration::LateCamera> late = {};  // looked for if the images contradict the calibration
+  std::vector<std::size_t> disagreeing = {};  // cameras that were inconsistent for most of the run
+  // Looked for if the images contradict the calibration, or a camera was inconsistent for some time.
+  std::optional<calibration::LateCamera> late = {};
 
   // Sets `applies` and `refined`. `complete`: the run was not interrupted; the map of an interrupted run may use an
   // estimate from its beginning, of which nothing is known. `replaced`: the map uses an estimated rig.

@@ -94,6 +94,12 @@ std::string what_became_of_estimate(const RunRecord& record) {
   if (calibration.refined) return "it was refined: see calibration in summary.json, and rig_refined.yaml";
   if (!record.complete) return "the estimate of a run that was interrupted is not used";
   if (calibration.applies) return "refine it with --set calibration.refine=auto";
+  if (const auto& late = calibration.late) {
+    return fmt::format(
+        "the estimate is not written to rig_refined.yaml, because it was made with images of {} that were taken at "
+        "other times than those of the other cameras",
+        record.cameras[late->camera].name);
+  }
   return "the estimate cannot be used for other recordings, because the images of some cameras disagree as a whole: "
          "their time stamps or extrinsics may be far off";
 }
@@ -135,9 +141,16 @@ void warn_of_losses(const RunRecord& record, const std::string& check_command, W
     const tracking::LostReason reason = frame.record->final_result().reason;
     return reason != tracking::LostReason::kNoImages && reason != tracking::LostReason::kFewFeatures;
   });
-  if (record.cameras.size() > 1 && !record.map.loaded && !record.calibration.foreign_images() &&
-      unexplained > count(record, FrameOutcome::kTracked))
+  if (record.cameras.size() < 2 || record.map.loaded || record.calibration.foreign_images() ||
+      unexplained <= count(record, FrameOutcome::kTracked))
+    return;
+  if (record.calibration.verdict() == calibration::Verdict::kConsistent) {
+    warn(warnings,
+         "most frames have no pose, but where there are poses the images agree with the calibration: too little light "
+         "or texture, fast motion and moving objects are likelier reasons");
+  } else {
     warn(warnings, "most frames have no pose, maybe because of a wrong calibration: test it ({})", check_command);
+  }
 }
 
 // Warns if the poses have no common world frame, or not that of the loaded map.
@@ -184,19 +197,40 @@ void warn_of_disagreement(const RunRecord& record, std::size_t camera, const std
     keypoints += frame.record->final_result().cameras[camera].keypoints;
     inliers += frame.record->final_result().cameras[camera].inliers;
   }
+  if (record.calibration.verdict() == calibration::Verdict::kConsistent) {
+    warn(warnings,
+         "{}: inconsistent with the other cameras at the end of the run, although the calibration agrees with the "
+         "images before: something may cover it or move in front of it, or it was moved",
+         record.cameras[camera].name);
+    return;
+  }
   warn(warnings, "{}: only {} of {} keypoints are inliers: check this camera's time stamps and extrinsics ({})",
        record.cameras[camera].name, inliers, keypoints, check_command);
+}
+
+std::string late_text(const RunRecord& record) {
+  const calibration::LateCamera& late = *record.calibration.late;
+  return calibration::describe_late_camera(late, record.cameras[late.camera].name, record.cameras[late.reference].name);
 }
 
 // Warns of pairs of cameras that should see the same things but do not.
 void warn_of_pairs(const RunRecord& record, const std::string& check_command, Warnings& warnings) {
   if (const std::string foreign = foreign_images_text(record); !foreign.empty()) {
-    return warn(warnings, "{}. Check which images are of which camera, and the direction of the transforms ({})",
-                foreign, check_command);
+    const bool mirrored = std::ranges::any_of(record.calibration.pairs, &calibration::CameraPair::mirrored);
+    return warn(warnings, "{}. {} ({})", foreign,
+                mirrored ? "Turn off the mirroring of the cameras or of their driver"
+                         : "Check which images are of which camera, and the direction of the transforms",
+                check_command);
   }
-  if (never_started(record))
+  if (const int fitting = record.calibration.pairs_as_given; never_started(record) && fitting > 0) {
+    warn(warnings,
+         "no map was started although there were images, and those of {} pair{} of cameras agree with the calibration: "
+         "too little texture or motion is a likelier reason than a wrong calibration ({})",
+         fitting, fitting == 1 ? "" : "s", check_command);
+  } else if (never_started(record)) {
     warn(warnings, "no map was started although there were images, maybe because of a wrong calibration: test it ({})",
          check_command);
+  }
   for (const calibration::CameraPair& pair : record.calibration.pairs) {
     warn(warnings,
          "the calibrated views of cameras {} and {} overlap by {:.0f} %, but only {:.1f} % of the features there are "
@@ -232,7 +266,10 @@ std::string foreign_images_text(const RunRecord& record) {
   const std::string names =
       fmt::format("{} and {}", record.cameras[best->first].name, record.cameras[best->second].name);
   const std::string shown =
-      best->keyframes == 0
+      best->mirrored() && best->keyframes > 0
+          ? fmt::format("the images are mirrored left to right, so poses, scale and map are wrong: of cameras {},",
+                        names)
+      : best->keyframes == 0
           ? fmt::format("the images do not belong to the calibration, so no map was started: of cameras {}", names)
           : fmt::format(
                 "the images do not belong to the calibration, so poses, scale and map are wrong: cameras {} "
@@ -245,6 +282,7 @@ std::string foreign_images_text(const RunRecord& record) {
 std::string unreliable_map_text(const RunRecord& record) {
   if (std::string foreign = foreign_images_text(record); !foreign.empty()) return foreign;
   const CalibrationRecord& calibration = record.calibration;
+  if (calibration.late) return late_text(record);
   const bool contradicted = calibration.estimate.verdict == calibration::Verdict::kInconsistent;
   return contradicted && !calibration.refined && record.complete ? contradiction_text(record) : "";
 }
@@ -262,9 +300,10 @@ std::vector<std::string> warnings_before_run(const dataset::Dataset& dataset) {
 std::vector<std::string> warnings_after_run(const RunRecord& record, const camera::Rig& rig,
                                             const std::string& check_command) {
   Warnings warnings;
-  if (const auto& late = record.calibration.late)
-    warnings.push_back(calibration::describe_late_camera(*late, record.cameras[late->camera].name,
-                                                         record.cameras[late->reference].name));
+  if (record.calibration.late)
+    warnings.push_back(late_text(record) +
+                       ", and run again: poses and scale are less accurate until then, and no "
+                       "rig_refined.yaml is written");
   warn_of_pairs(record, check_command, warnings);
   for (std::size_t c = 0; c < record.cameras.size(); ++c) {
     const CameraRecord& camera = record.cameras[c];

@@ -105,6 +105,19 @@ ordered_json calibrated_camera_json(const std::string& name, const calibration::
           {"readout_std_ms", known(camera.readout.std_ms, camera.readout.refined)}};
 }
 
+ordered_json late_json(const RunRecord& record) {
+  const auto& late = record.calibration.late;
+  if (!late) return nullptr;
+  return {{"name", record.cameras[late->camera].name},
+          {"reference", record.cameras[late->reference].name},
+          {"early", late->early},
+          {"part", late->part},
+          {"matches", late->matches},
+          {"fit", late->agreeing},
+          {"matches_one_frame_apart", late->matches_apart},
+          {"fit_one_frame_apart", late->agreeing_apart}};
+}
+
 ordered_json calibration_json(const RunRecord& record) {
   const calibration::RigRefinement& estimate = record.calibration.estimate;
   ordered_json cameras = ordered_json::array();
@@ -125,6 +138,7 @@ ordered_json calibration_json(const RunRecord& record) {
           {"excess_bound", rounded(record.calibration.excess_bound, 4)},
           {"pairs", pairs},
           {"disagreeing", disagreeing},
+          {"late_camera", late_json(record)},
           {"refined", record.calibration.refined},
           {"cameras", cameras}};
 }

@@ -1,6 +1,7 @@
 #include "system/localiser.h"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 #include <utility>
 
@@ -80,17 +81,15 @@ class PlacesOfThread final : public looping::PlaceRecogniser {
   const std::shared_ptr<looping::PlaceRecogniser> places_;
 };
 
-// Returns true if a camera has landmarks of the map in view of which hardly any is where the pose of the others expects
-// it: images under the names of other cameras, or another rig. A run would find out with the frames that follow.
-bool cameras_disagree(const tracking::FrameRecord& record) {
-  constexpr int kMinMatches = 30;
-  constexpr double kMinShare = 0.25;
-  return std::ranges::any_of(record.result.cameras, [](const tracking::CameraCounts& camera) {
-    return camera.matched >= kMinMatches && camera.inliers < kMinShare * camera.matched;
-  });
-}
-
 }  // namespace
+
+bool contradicts_pose(const tracking::CameraCounts& camera) {
+  constexpr int kMinMatches = 30;
+  constexpr double kMinShare = 0.25, kHalf = 0.5, kSigmas = 3;
+  const double sigma = std::sqrt(kHalf * (1 - kHalf) * camera.matched);
+  const double least = std::max(kMinShare * camera.matched, kHalf * camera.matched - kSigmas * sigma);
+  return camera.matched >= kMinMatches && camera.inliers < least;
+}
 
 Localiser::Localiser(camera::Rig rig, const Config& config, map::BundledMap map, place::VocabularyPtr vocabulary,
                      std::vector<image::Image> masks)
@@ -113,7 +112,7 @@ Result<tracking::FrameRecord> Localiser::localise(const image::ImageBundle& imag
   Pipeline::Outcome outcome = pipeline.process(widened(images, cameras_, rig_.size()), map);
   narrow(outcome.record, cameras_);
   tracking::TrackResult& result = outcome.record.result;
-  if (result.status == tracking::TrackStatus::kTracking && cameras_disagree(outcome.record)) {
+  if (result.status == tracking::TrackStatus::kTracking && std::ranges::any_of(result.cameras, contradicts_pose)) {
     result.status = tracking::TrackStatus::kLost;
     result.reason = tracking::LostReason::kUnstablePose;
   }

@@ -16,6 +16,11 @@
 
 namespace bslam::system {
 
+// Returns true if a camera has landmarks of the map in view of which hardly any, or of many significantly less than
+// half, are where the pose of the frame expects them: images under the names of other cameras, or another rig. A run
+// would find out with the frames that follow.
+bool contradicts_pose(const tracking::CameraCounts& camera);
+
 // Holds one copy of the map and of the index of places, which all threads share. All functions are thread-safe.
 class Localiser {
  public:

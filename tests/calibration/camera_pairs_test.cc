@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "calibration/rig_warnings.h"
+#include "camera/stereo_rig.h"
 #include "geometry/so3.h"
 #include "mapping/simulated_map.h"
 
@@ -59,6 +60,43 @@ TEST(CameraPairs, RevealExchangedCamerasAndInvertedTransforms) {
   const auto pairs = tested(seen, rig, rig);
   EXPECT_TRUE(pairs[0].hardly_matched());
   EXPECT_FALSE(pairs[0].contradicted);
+}
+
+// The same with principal points in the middle of the images, so that mirrored images are those of another rig.
+camera::Rig centred_pair() {
+  const camera::Rig rig = turned_pair();
+  const camera::Camera camera = camera::stereo_rig().camera(0u);
+  return camera::Rig({{camera, rig.body_from_cam(0)}, {camera, rig.body_from_cam(1)}});
+}
+
+// The rig whose images are those of `rig` after mirroring.
+camera::Rig mirrored(const camera::Rig& rig) {
+  const Eigen::Vector3d flip(-1, 1, 1);
+  std::vector<camera::RigCamera> cameras;
+  for (std::size_t c = 0; c < rig.size(); ++c) {
+    const geometry::SE3 T = rig.rig_from_cam(c);
+    const Eigen::Matrix3d R = flip.asDiagonal() * T.matrix3() * flip.asDiagonal();
+    const Eigen::Vector3d t = flip.asDiagonal() * T.translation();
+    cameras.push_back({rig.camera(c), rig.body_from_cam(0) * geometry::SE3(Eigen::Quaterniond(R), t)});
+  }
+  return camera::Rig(std::move(cameras));
+}
+
+// The refinement makes mirrored images of two cameras fit, so that they share many features.
+TEST(CameraPairs, RevealMirroredImagesThatWereMatched) {
+  const camera::Rig rig = centred_pair();
+  const map::SimulatedMap seen = seen_by(mirrored(rig), 0.8);
+  EXPECT_FALSE(tested(seen, rig, rig)[0].contradicted);
+  const auto suspected = test_pairs(seen.map, seen.map.keyframe_ids(), 0, rig, rig, true);
+  ASSERT_TRUE(suspected[0].evidence);
+  EXPECT_TRUE(suspected[0].mirrored()) << describe_pair(*suspected[0].evidence);
+  const map::SimulatedMap right = seen_by(rig, 0.8);
+  EXPECT_FALSE(test_pairs(right.map, right.map.keyframe_ids(), 0, rig, rig, true)[0].contradicted);
+  // An offset between the times that was estimated hides no pair.
+  std::vector<camera::RigCamera> later{{rig.camera(0u), rig.body_from_cam(0)}, {rig.camera(1u), rig.body_from_cam(1)}};
+  later[1].camera.time_offset_ns = 8'000'000;
+  const auto moved = test_pairs(seen.map, seen.map.keyframe_ids(), 0, rig, camera::Rig(later), true);
+  EXPECT_TRUE(moved[0].mirrored());
 }
 
 TEST(CameraPairs, OfDarkOrSeparateViewsAreNotAccused) {

@@ -51,6 +51,39 @@ TEST(ConventionCheck, FindsTheIntendedConvention) {
   EXPECT_EQ(judged(with_inverse_extrinsics(swapped), views).verdict, Convention::kSwappedInverse);
 }
 
+std::array<feature::Detections, 2> mirrored(std::array<feature::Detections, 2> views, const camera::Rig& rig) {
+  for (std::size_t c = 0; c < 2; ++c) {
+    for (auto& pixel : views[c].pixel) pixel.x() = static_cast<float>(rig.camera(c).width - 1) - pixel.x();
+  }
+  return views;
+}
+
+// Mirrored images of both cameras fit each other as well as the true ones.
+TEST(ConventionCheck, FindsThatTheImagesOfBothCamerasAreMirrored) {
+  const camera::Rig rig = camera::stereo_rig();
+  const PairEvidence evidence = judged(rig, mirrored(views_of(rig), rig));
+  EXPECT_EQ(evidence.verdict, Convention::kMirrored) << describe_pair(evidence);
+  EXPECT_NE(describe_evidence(std::array{evidence})
+                .find("150 of 150 matches are consistent with the calibration if the images of both cameras are "
+                      "mirrored left to right; "),
+            std::string::npos)
+      << describe_pair(evidence);
+}
+
+// Of cameras side by side it cannot be told whether they are exchanged or both mirrored, and both are said.
+TEST(ConventionCheck, MirroredImagesOfASymmetricPairMayBeExchangedOnes) {
+  const camera::Rig stereo = camera::stereo_rig();
+  const SE3 step(geometry::so3_exp(Eigen::Vector3d::Zero()), {0.12, 0, 0});
+  const SE3 body = stereo.body_from_cam(0);
+  const camera::Rig rig({{stereo.camera(0u), body}, {stereo.camera(0u), body * step}});
+  const PairEvidence evidence = judged(rig, mirrored(views_of(rig), rig));
+  ASSERT_TRUE(evidence.verdict);
+  EXPECT_NE(*evidence.verdict, Convention::kAsGiven);
+  EXPECT_NE(describe_pair(evidence).find("exchanged, or if the images of both cameras are mirrored left to right; "),
+            std::string::npos)
+      << describe_pair(evidence);
+}
+
 // Cameras 1 and 2 of a ring are exchanged: the images of cameras 0 and 1 are those of cameras 0 and 2.
 TEST(ConventionCheck, NamesTheCamerasThatWereExchanged) {
   const camera::Rig stereo = camera::stereo_rig();
@@ -124,12 +157,18 @@ TEST(ConventionCheck, ReportsTheNumberOfTestedPairs) {
       .first = 0, .second = 1, .matches = 100, .agreeing = {90, 1, 2, 3, 4}, .verdict = Convention::kAsGiven};
   const PairEvidence apart{.first = 0, .second = 2, .matches = 10};
   const std::string text = describe_evidence(std::array{good, apart});
-  EXPECT_NE(text.find("1 of 2 pairs could not be tested, among them all pairs of camera 2\n"), std::string::npos)
+  EXPECT_NE(text.find("  1 of 2 pairs could be tested, and the images are consistent with the extrinsics of this one\n"
+                      "  not tested because of too few matches: cameras 0 and 2\n"
+                      "  nothing is known of the extrinsics of cameras in no tested pair: 2\n"),
+            std::string::npos)
       << text;
+  EXPECT_EQ(text.find("the extrinsics are consistent with the images"), std::string::npos);
   const PairEvidence also{
       .first = 1, .second = 2, .matches = 100, .agreeing = {90, 1, 2, 3, 4}, .verdict = Convention::kAsGiven};
-  EXPECT_NE(describe_evidence(std::array{good, apart, also}).find("1 of 3 pairs could not be tested\n"),
+  const std::string most = describe_evidence(std::array{good, apart, also});
+  EXPECT_NE(most.find("  2 of 3 pairs could be tested, and the images are consistent with the extrinsics of these\n"),
             std::string::npos);
+  EXPECT_EQ(most.find("nothing is known"), std::string::npos);
 }
 
 TEST(ConventionCheck, SaysWhyAPairWasNotTestedAndWarnsIfItHasMuchOverlap) {
@@ -142,6 +181,9 @@ TEST(ConventionCheck, SaysWhyAPairWasNotTestedAndWarnsIfItHasMuchOverlap) {
   EXPECT_EQ(describe_pair(blank),
             "not tested: too few matches for a decision (10); the calibrated views overlap by 50 %");
   EXPECT_EQ(describe_evidence(std::array{good, apart}).find("warning"), std::string::npos);
+  EXPECT_NE(describe_evidence(std::array{good, apart})
+                .find("  not tested because of views that hardly overlap: cameras 0 and 2\n"),
+            std::string::npos);
   EXPECT_NE(describe_evidence(std::array{good, apart, blank})
                 .find("warning: 1 of 2 pairs with much overlap could not be tested: cameras 1 and 2\n"),
             std::string::npos);

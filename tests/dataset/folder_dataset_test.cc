@@ -357,6 +357,40 @@ TEST_F(ImageFolders, AJumpOfTheClockIsSaid) {
       "walk: time stamps jump by 300.1 s after 0.100 s: two recordings in one, a clock that was set, or a pause"));
 }
 
+// Names that are stamps do not tell the order of capture: two parts of the recording interleave.
+TEST_F(ImageFolders, AClockThatWasSetBackIsSaid) {
+  const auto warned = [&](int images, const std::function<long long(int)>& ms) {
+    ++folders_;
+    const fs::path folder = data() / "cam0";
+    fs::remove_all(folder);
+    for (int k = 0; k < images; ++k)
+      support::write_image(folder / (std::to_string(1'000'000'000'000 + 1'000'000 * ms(k)) + ".png"), 60, 20, k);
+    const auto dataset = open({"a"});
+    return dataset && has_text(dataset->warnings, "as if the clock was set back");
+  };
+  EXPECT_TRUE(warned(60, [](int k) { return 50 * k - (k >= 30 ? 733 : 0); }));
+  EXPECT_FALSE(warned(60, [](int k) { return 50 * k; }));
+  EXPECT_FALSE(warned(60, [](int k) { return k < 30 ? 50 * k : 1500 + 25 * (k - 30); }));  // another frame rate
+  EXPECT_FALSE(warned(60, [](int k) { return k % 2 == 0 ? 50 * k : 50 * k - 17; }));       // alternating exposures
+  EXPECT_FALSE(warned(60, [](int k) { return 50 * (k + k / 3); }));                        // lost images
+}
+
+TEST_F(ImageFolders, SecondsAreNoNumbersOfImages) {
+  add("cam0", [](int k) { return std::to_string(1'700'000'000 + k) + ".png"; });
+  const auto dataset = open({"a"}, {}, {.rate_hz = 10});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_TRUE(has_text(dataset->warnings, "1700000000 and the others are taken for the numbers of images"));
+  const auto in_seconds = open({"a"}, {}, {.unit_ns = TimeNs{1'000'000'000}});
+  ASSERT_TRUE(in_seconds) << in_seconds.error().message();
+  EXPECT_FALSE(has_text(in_seconds->warnings, "numbers of images"));
+}
+
+TEST_F(ImageFolders, RecordingsInOtherFoldersAreNamed) {
+  for (const char* folder : {"seq1/cam0", "seq1/cam1", "day/seq2/cam0", "day/seq2/cam1"}) add_stamped(folder);
+  const auto dataset = open_dataset({.path = data()});
+  expect_error(dataset, "found no recording, but folders that look like one in day/seq2, seq1, expected one of them: ");
+}
+
 TEST_F(ImageFolders, ImagesOfHalfTheResolutionAreRecognised) {
   for (int k = 0; k < kImages; ++k) support::write_image(data() / "cam0" / numbered(k), 30, 10, k);
   const auto dataset = open({"a"}, {}, {.rate_hz = 10});

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "calibration/convention_check.h"
+#include "calibration/late_camera.h"
 #include "calibration/rig_warnings.h"
 #include "camera/stereo_rig.h"
 #include "containers/mcap_writer.h"
@@ -145,6 +146,33 @@ TEST_F(RigReport, TestsTheExtrinsicsAgainstImages) {
   EXPECT_EQ(mirrored[0].mirrored->camera, 1u);
   EXPECT_NE(calibration::describe_evidence(mirrored).find("warning: the images of camera 1 are mirrored"),
             std::string::npos);
+}
+
+// A camera loses a frame in the middle of a recording, and its further images are renumbered.
+TEST_F(RigReport, ACameraThatBecomesLateIsFound) {
+  constexpr std::size_t kTriples = 8;
+  ThreadPool pool(2);
+  const simulator::SimulationRequest request{.folder = folder_ / "data",
+                                             .rig = synthetic::ring_rig(2, 240),
+                                             .recording = {.duration_s = 2.5, .rate_hz = 10},
+                                             .tour = {.duration_s = 2.5},
+                                             .imaging = {},
+                                             .world = {.texel = 0.03, .light_texel = 0.8, .ambient_rays = 2}};
+  ASSERT_TRUE(simulator::write_simulation(request, pool).ok());
+  const auto data = dataset::open_dataset({.path = folder_ / "data"});
+  ASSERT_TRUE(data) << data.error().message();
+  std::vector<image::ImageBundle> right, late;
+  for (std::size_t k = 0; k < 3 * kTriples; ++k) {
+    right.push_back(dataset::read_frame(*data, k));
+    late.push_back(dataset::read_frame(*data, k));
+    if (k >= 3 * kTriples / 2) late.back().images[1].image = dataset::read_frame(*data, k + 1).images[1].image;
+  }
+  const std::vector<image::Image> masks(2);
+  EXPECT_FALSE(calibration::find_late_camera(data->rig, right, masks));
+  const auto found = calibration::find_late_camera(data->rig, late, masks);
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->part, "last half");
+  EXPECT_TRUE(found->early);
 }
 
 }  // namespace

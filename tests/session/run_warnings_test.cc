@@ -41,6 +41,67 @@ TEST(RunWarnings, ACameraThatIsOneFrameLateIsNamedFirst) {
       << warnings[0];
 }
 
+// The estimate is made with images of different times.
+TEST(RunWarnings, WithALateCameraNoEstimateIsOffered) {
+  RunRecord record;
+  record.cameras.resize(2);
+  record.cameras[1].name = "right";
+  record.calibration.estimate.done = true;
+  record.calibration.estimate.verdict = calibration::Verdict::kConsistent;
+  record.calibration.accept_estimate(true, true);
+  EXPECT_TRUE(record.calibration.refined);
+  EXPECT_EQ(record.calibration.verdict(), calibration::Verdict::kConsistent);
+  record.calibration.late = calibration::LateCamera{.camera = 1, .part = "last half"};
+  record.calibration.accept_estimate(true, true);
+  EXPECT_FALSE(record.calibration.applies || record.calibration.refined);
+  EXPECT_EQ(record.calibration.verdict(), calibration::Verdict::kUnknown);
+  EXPECT_NE(unreliable_map_text(record).find("right: its images are about one frame late"), std::string::npos);
+  record.calibration.estimate.verdict = calibration::Verdict::kInconsistent;
+  const std::vector<std::string> warnings = warnings_after_run(record, synthetic::default_rig(), "");
+  EXPECT_TRUE(has_text(warnings, "in the last half of the recording"));
+  EXPECT_TRUE(has_text(warnings, "no rig_refined.yaml is written"));
+  EXPECT_TRUE(has_text(warnings, "the estimate is not written to rig_refined.yaml"));
+  EXPECT_FALSE(has_text(warnings, "calibration.refine=true"));
+}
+
+TEST(RunWarnings, MirroredImagesAreNamed) {
+  RunRecord record;
+  record.cameras.resize(2);
+  record.cameras[0].name = "left";
+  record.cameras[1].name = "right";
+  record.calibration.pairs = {{.first = 0,
+                               .second = 1,
+                               .keyframes = 8,
+                               .evidence = calibration::PairEvidence{.matches = 100,
+                                                                     .agreeing = {30, 0, 0, 0, 0, 98},
+                                                                     .verdict = calibration::Convention::kMirrored},
+                               .contradicted = true}};
+  EXPECT_TRUE(has_text(warnings_after_run(record, synthetic::default_rig(), "check"),
+                       "the images are mirrored left to right, so poses, scale and map are wrong: of cameras left and "
+                       "right, 98 of 100 matches are consistent with the calibration if the images of both cameras are "
+                       "mirrored left to right; 30 with it as given. Turn off the mirroring of the cameras or of their "
+                       "driver (check)"));
+}
+
+// Most frames are lost, which has other reasons if the calibration agrees with the images.
+TEST(RunWarnings, ACalibrationThatAgreesIsNotBlamed) {
+  RunRecord record;
+  record.cameras.resize(2);
+  record.frames.resize(3);
+  for (RunFrame& frame : record.frames) {
+    frame.record.emplace();
+    frame.record->result.status = tracking::TrackStatus::kLost;
+    frame.record->result.reason = tracking::LostReason::kFewMatches;
+    frame.record->result.cameras.resize(2);
+  }
+  const auto warnings = [&] { return warnings_after_run(record, synthetic::default_rig(), "check"); };
+  record.maps_started = 1;
+  EXPECT_TRUE(has_text(warnings(), "most frames have no pose, maybe because of a wrong calibration"));
+  record.calibration.estimate.verdict = calibration::Verdict::kConsistent;
+  EXPECT_FALSE(has_text(warnings(), "wrong calibration"));
+  EXPECT_TRUE(has_text(warnings(), "fast motion and moving objects are likelier reasons"));
+}
+
 // A map of a calibration that was contradicted and kept is stored with the reason.
 TEST(RunWarnings, AMapOfAContradictedCalibrationIsUnreliable) {
   RunRecord record;
