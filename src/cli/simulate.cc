@@ -61,7 +61,9 @@ Error as_option(Error error) {
 // Sets length and duration. The duration of a drive through the town follows from its length and speed.
 Status set_extent(const SimulateArguments& arguments, simulator::SimulationRequest& request) {
   const bool town = request.kind == simulator::WorldKind::kTown;
-  if (arguments.length || town) {
+  if (arguments.length && !town)
+    return Error{"command line", "--length", *arguments.length, "a length with --world town only"};
+  if (town) {
     const auto length = read_length(arguments.length.value_or("1km"));
     if (!length) return length.error();
     request.tour.length_m = *length;

@@ -115,8 +115,9 @@ void add_hall(Building& b, const Area& area, Random& random, Detail detail) {
   add_flat(b, base, height, texture(Material::kTile, 0.4f, random), kCoarseTexel);
   for (Facade side : sides_of(base)) {
     side.height = height;
+    Random own(random.next(), "side");
     Texture look = wall;
-    look.seed = static_cast<std::uint32_t>(random.next());
+    look.seed = static_cast<std::uint32_t>(own.next());
     constexpr double kPiece = 10.0;
     const int pieces = std::max(1, static_cast<int>(std::lround(side.length / kPiece)));
     for (int i = 0; i < pieces; ++i) {
@@ -124,13 +125,13 @@ void add_hall(Building& b, const Area& area, Random& random, Detail detail) {
       add_front(b, {side.start + from * side.along, side.along, to - from, 0}, 0, height, look);
       b.surfaces.back().pattern_origin = {-to, 0};
     }
-    const double gate = random.uniform(4.0, 6.0), windows = random.uniform(4.5, 7.0);
-    const double at = random.uniform(2.0, side.length - gate - 2.0);
-    const Texture door = texture(Material::kPlanks, 0.4f, random);
+    const double gate = own.uniform(4.0, 6.0), windows = own.uniform(4.5, 7.0);
+    const double at = own.uniform(2.0, side.length - gate - 2.0);
+    const Texture door = texture(Material::kPlanks, 0.4f, own);
     if (detail != Detail::kComplete) continue;
     add_panel(b, side, at, kKerb, {gate, 3.2}, door);
     for (double x = 2; x + 2.5 < side.length; x += windows)
-      add_panel(b, side, x, height - 1.3, {2.0, 0.8}, texture(Material::kWindow, 0.5f, random));
+      add_panel(b, side, x, height - 1.3, {2.0, 0.8}, texture(Material::kWindow, 0.5f, own));
   }
 }
 

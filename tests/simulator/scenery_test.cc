@@ -14,10 +14,8 @@ constexpr WorldOptions kCoarse{.texel = 0.04, .light_texel = 0.5, .ambient_rays 
 Scenery short_drive() { return make_scenery(WorldKind::kTown, 3, {.seed = 3, .length_m = 300}, kCoarse); }
 
 camera::Rig small_camera() {
-  camera::Camera camera;
-  camera.name = "front";
-  camera.model = camera::Pinhole({60, 60, 59.5, 37.5});
-  camera.width = 120, camera.height = 76;
+  const camera::Camera camera{
+      .name = "front", .model = camera::Pinhole({60, 60, 59.5, 37.5}), .width = 120, .height = 76, .mask_file = {}};
   const Eigen::Matrix3d forward{{0, 0, 1}, {-1, 0, 0}, {0, -1, 0}};
   return camera::Rig({{camera, geometry::SE3(Eigen::Quaterniond(forward), Vector3d::Zero())}});
 }
