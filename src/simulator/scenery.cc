@@ -18,6 +18,7 @@ WorldOptions options_for_town(WorldOptions options) {
   options.ambient_rays = std::max(1, options.ambient_rays / 2);
   options.sample_spacing = 2 * options.texel;
   options.hiding_distance = 12.0;
+  options.hidden_texel = 2.0;
   return options;
 }
 

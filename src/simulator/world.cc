@@ -23,7 +23,7 @@ constexpr double kMinLight = 0.012;    // minimum irradiance by a lamp for which
 const Vector3d kLampPoints[] = {{1, 0.2, 0}, {-0.3, 0.9, 0.1}, {-0.9, -0.4, -0.1}, {0.2, -0.9, 0}, {0, 0, -0.2}};
 constexpr float kLampLight = 2.2f, kDaylight = 0.75f, kSkyLight = 0.95f;
 constexpr double kSunReach = 80.0;     // metres within which surfaces cast shadows of the sun
-constexpr double kHiddenTexel = 0.25;  // metres
+constexpr double kLeastCoarse = 0.25;  // metres: texels of surfaces that seem to be hidden by others are larger
 constexpr double kCoarser = 4.0;       // factor on the texels of surfaces that seem to be hidden by others
 constexpr double kCoarsest = 4.0;      // largest texel size relative to the smallest, except far away
 
@@ -136,8 +136,7 @@ std::vector<std::optional<double>> World::texel_sizes(const WorldOptions& option
 }
 
 std::optional<double> World::texel_of(const Surface& s, const WorldOptions& options) const {
-  constexpr double kTexelPerDistance = 0.002;  // radians; about one pixel of the default cameras
-  constexpr double kFar = 10.0;                // metres; surfaces of the indoor worlds are nearer
+  constexpr double kFar = 10.0;  // metres; surfaces of the indoor worlds are nearer
   const Vector3d n = unit_normal(s);
   bool seen = building_.tour.empty();
   double nearest = seen ? 0.0 : std::numeric_limits<double>::infinity();
@@ -154,9 +153,9 @@ std::optional<double> World::texel_of(const Surface& s, const WorldOptions& opti
   }
   if (!seen) return std::nullopt;
   const double farthest = nearest > kFar ? std::numeric_limits<double>::infinity() : kCoarsest * options.texel;
-  const double texel = std::max(std::clamp(kTexelPerDistance * nearest, options.texel, farthest), s.min_texel);
+  const double texel = std::max(std::clamp(options.texel_per_distance * nearest, options.texel, farthest), s.min_texel);
   const bool uncertain = options.hiding_distance > 0 && nearest > options.hiding_distance;
-  return uncertain && hidden_by_others(s) ? std::max(kCoarser * texel, kHiddenTexel) : texel;
+  return uncertain && hidden_by_others(s) ? std::max(kCoarser * texel, kLeastCoarse) : texel;
 }
 
 void World::lay_out(const WorldOptions& options, ThreadPool& pool) {
@@ -167,9 +166,9 @@ void World::lay_out(const WorldOptions& options, ThreadPool& pool) {
     Baked b{};
     b.normal = unit_normal(s).cast<float>();
     const double w = s.u.norm(), h = s.v.norm();
-    const double texel = sizes[i].value_or(kHiddenTexel);
+    const double texel = sizes[i].value_or(options.hidden_texel);
     b.hidden = !sizes[i].has_value();
-    b.samples = uniform_light(s.texture.material) ? 1 : samples_per_texel(options.sample_spacing, texel);
+    b.samples = b.hidden || uniform_light(s.texture.material) ? 1 : samples_per_texel(options.sample_spacing, texel);
     b.texels_per_m = static_cast<float>(1 / texel);
     b.width = std::max(1, static_cast<std::int32_t>(std::lround(w / texel)));
     b.height = std::max(1, static_cast<std::int32_t>(std::lround(h / texel)));

@@ -14,9 +14,11 @@
 namespace bslam::simulator {
 
 struct WorldOptions {
-  double texel = 0.005;       // metres per texel near the tour; surfaces farther away have larger texels
-  double light_texel = 0.10;  // metres between samples of the light
-  int ambient_rays = 24;      // rays per light sample for ambient occlusion
+  double texel = 0.005;               // metres per texel near the tour; surfaces farther away have larger texels
+  double texel_per_distance = 0.002;  // radians; of surfaces farther away: about one pixel of the default cameras
+  double light_texel = 0.10;          // metres between samples of the light
+  int ambient_rays = 24;              // rays per light sample for ambient occlusion
+  double hidden_texel = 0.25;         // metres per texel of surfaces that face away from the whole tour
   // Metres; larger texels are means of two samples of the albedo in each direction. 0: of one sample.
   double sample_spacing = 0;
   // Metres; surfaces farther from the tour have coarse texels if others hide them. 0: none.

@@ -277,7 +277,7 @@ class TownWriter : public SimulationWriter {
     r.tour.length_m = 200;
     r.recording.duration_s = *drive_duration(r);
     r.recording.rate_hz = 0.1;
-    r.world = {.texel = 0.1, .light_texel = 5, .ambient_rays = 1};
+    r.world = {.texel = 0.1, .texel_per_distance = 0.05, .light_texel = 5, .ambient_rays = 1};
     return r;
   }
 };

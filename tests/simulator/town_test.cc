@@ -81,7 +81,7 @@ TEST(Town, HasNoHolesAroundTheStreets) {
   ThreadPool pool(2);
   const StreetGrid grid = make_street_grid(1);
   const World world(make_town(grid, 1, path_from(grid, 5), {.complete = 60, .houses = 120}),
-                    {.texel = 0.5, .light_texel = 20, .ambient_rays = 1}, pool);
+                    {.texel = 0.5, .texel_per_distance = 0.05, .light_texel = 20, .ambient_rays = 1}, pool);
   Random random(1, "rays");
   int backs = 0;
   for (int i = 0; i < 20000; ++i) {
