@@ -34,8 +34,9 @@ def simulate(
     out: Path,
     *,
     rig: Path | Rig | None = None,
-    world: Literal["building", "corridor", "twin-rooms", "outdoor"] = "building",
-    duration: float = 20.0,
+    world: Literal["building", "corridor", "twin-rooms", "outdoor", "town"] = "building",
+    duration: float | None = None,
+    length: str | float | None = None,
     rate: float = 20.0,
     seed: int = 1,
     tour_seed: int | None = None,
@@ -55,14 +56,15 @@ def simulate(
         out: folder to write into.
         rig: the cameras; default: four cameras, two of them in front.
         world: building: different rooms; corridor, twin-rooms: places that look exactly alike; outdoor: a
-            square with houses and trees.
-        duration: seconds.
+            square with houses and trees; town: a drive through streets, with loops.
+        duration: seconds; default: 20, or that of the whole drive through the town.
+        length: length of the drive through the town in metres, or a text such as "5km"; default: 1 km.
         rate: images per second of each camera.
         seed: seed of world, motion and noise.
         tour_seed: seed of motion and noise, for further tours of one world; default: that of seed.
         start: time stamp of the first images in seconds.
         laps: laps of the tour within the duration; 0: as many as a walking pace allows.
-        speed: metres per second; 0: determined by duration and laps.
+        speed: metres per second; 0: determined by duration and laps, or 8 in the town.
         back: turn around after half of the duration and return along the same path.
         exposure_ms: exposure time in milliseconds, which causes motion blur.
         noise: factor applied to the sensor noise.
@@ -80,6 +82,7 @@ def simulate(
     options = {
         "world": world,
         "duration": duration,
+        "length": length,
         "rate": rate,
         "seed": seed,
         "tour_seed": tour_seed,

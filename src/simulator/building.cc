@@ -2,6 +2,7 @@
 
 #include <array>
 
+#include "base/assert.h"
 #include "base/random.h"
 #include "simulator/furniture.h"
 #include "simulator/outdoor.h"
@@ -88,6 +89,7 @@ Building make_building(std::uint64_t seed) {
 }
 
 Building make_building(WorldKind kind, std::uint64_t seed) {
+  BSLAM_ASSERT(kind != WorldKind::kTown, "the town is made in parts");
   switch (kind) {
     case WorldKind::kCorridor:
       return make_corridor(seed);
@@ -95,6 +97,7 @@ Building make_building(WorldKind kind, std::uint64_t seed) {
       return make_twin_rooms(seed);
     case WorldKind::kOutdoor:
       return make_outdoor(seed);
+    case WorldKind::kTown:
     case WorldKind::kBuilding:
       break;
   }

@@ -2,6 +2,7 @@
 // tour through six of them. World frame: x east, y north, z up, with the floor at z = 0.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,12 @@ struct Lamp {
   double intensity;  // irradiance of a surface facing the lamp at 1 m; a well lit white wall has about 1
 };
 
+// The sun: its light is the same everywhere.
+struct Sun {
+  Vector3d direction;  // unit vector towards it
+  double irradiance;   // of a surface facing it
+};
+
 // Interior of a room, in metres.
 struct Room {
   std::string name;
@@ -26,6 +33,7 @@ struct Building {
   std::vector<Room> rooms;
   std::vector<Surface> surfaces;
   std::vector<Lamp> lamps;
+  std::optional<Sun> sun;
   // The closed tour in the plane: points with a spacing of kTourStep; the last point is one step before the first.
   // Walls and furniture keep a distance of kTourClearance from all points that are within kTourSway of the tour at a
   // height in [kTourLow, kTourHigh].
@@ -39,8 +47,11 @@ struct Building {
 // the same for every seed.
 Building make_building(std::uint64_t seed);
 
-// The available worlds: this building, those of simulator/repeated_world.h, and that of simulator/outdoor.h.
-enum class WorldKind { kBuilding, kCorridor, kTwinRooms, kOutdoor };
+// The available worlds: this building, those of simulator/repeated_world.h, and those of simulator/outdoor.h and
+// simulator/town.h.
+enum class WorldKind { kBuilding, kCorridor, kTwinRooms, kOutdoor, kTown };
+
+// Creates a world that is small enough to be made as a whole: any but the town.
 Building make_building(WorldKind kind, std::uint64_t seed);
 
 }  // namespace bslam::simulator

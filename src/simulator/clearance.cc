@@ -8,6 +8,24 @@ namespace {
 
 constexpr double kStep_s = 0.04;  // a few centimetres of a tour
 
+constexpr int kWindow = 25;  // steps for which nearby surfaces are selected at once
+
+// The surfaces that cameras of the rig may touch within the kWindow steps from a time.
+std::vector<Surface> surfaces_near(const std::vector<Surface>& surfaces, const camera::Rig& rig,
+                                   const synthetic::Trajectory& trajectory, double time_s) {
+  double reach = 0;
+  for (std::size_t c = 0; c < rig.size(); ++c) reach = std::max(reach, rig.body_from_cam(c).translation().norm());
+  const Vector3d from = trajectory.T_world_body(time_s).translation();
+  double travelled = 0;
+  for (int i = 0; i <= kWindow; ++i)
+    travelled = std::max(travelled, (trajectory.T_world_body(time_s + i * kStep_s).translation() - from).norm());
+  std::vector<Surface> near;
+  for (const Surface& s : surfaces) {
+    if (distance_to_surfaces({&s, 1}, from) < reach + travelled + kCameraClearance) near.push_back(s);
+  }
+  return near;
+}
+
 // Whether the line from `a` to `b` passes through the rectangle.
 bool crosses(const Surface& s, const Vector3d& a, const Vector3d& b) {
   const Vector3d n = s.u.cross(s.v);
@@ -21,16 +39,18 @@ bool crosses(const Surface& s, const Vector3d& a, const Vector3d& b) {
 }  // namespace
 
 std::optional<Collision> first_collision(const std::vector<Surface>& surfaces, const camera::Rig& rig,
-                                         const synthetic::Trajectory& trajectory, double duration_s) {
-  const auto steps = static_cast<int>(std::ceil(duration_s / kStep_s));
+                                         const synthetic::Trajectory& trajectory, double from_s, double to_s) {
+  const auto steps = static_cast<int>(std::ceil((to_s - from_s) / kStep_s));
+  std::vector<Surface> near;
   for (int i = 0; i <= steps; ++i) {
-    const double time_s = std::min(duration_s, i * kStep_s);
+    const double time_s = std::min(to_s, from_s + i * kStep_s);
+    if (i % kWindow == 0) near = surfaces_near(surfaces, rig, trajectory, time_s);
     const geometry::SE3 T_world_body = trajectory.T_world_body(time_s);
     for (std::size_t c = 0; c < rig.size(); ++c) {
       const Vector3d at = T_world_body * rig.body_from_cam(c).translation();
       const auto between = [&](const Surface& s) { return crosses(s, T_world_body.translation(), at); };
-      if (std::ranges::any_of(surfaces, between)) return Collision{c, time_s, 0};
-      const double distance = distance_to_surfaces(surfaces, at);
+      if (std::ranges::any_of(near, between)) return Collision{c, time_s, 0};
+      const double distance = distance_to_surfaces(near, at);
       if (distance < kCameraClearance) return Collision{c, time_s, distance};
     }
   }

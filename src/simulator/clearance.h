@@ -19,9 +19,9 @@ struct Collision {
   double distance = 0;  // metres from the nearest surface; 0: a surface is between the body and the camera
 };
 
-// Returns the first time at which a camera is too close to a surface, or behind one as seen from the origin of the body
-// frame, which the tour keeps clear of all surfaces.
+// Returns the first time in [from_s, to_s] at which a camera is too close to a surface, or behind one as seen from the
+// origin of the body frame, which the tour keeps clear of all surfaces.
 std::optional<Collision> first_collision(const std::vector<Surface>& surfaces, const camera::Rig& rig,
-                                         const synthetic::Trajectory& trajectory, double duration_s);
+                                         const synthetic::Trajectory& trajectory, double from_s, double to_s);
 
 }  // namespace bslam::simulator

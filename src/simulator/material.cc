@@ -287,6 +287,27 @@ float horizon(const Texture& t, float x, float y) {
   return mix(0.16f * (1 + 0.5f * woods), mix(0.3f, 0.7f, unit(hash(1, 8, cell_seed))), built) + haze;
 }
 
+float asphalt(const Texture& t, float x, float y) {
+  const float stains = fractal_noise(0.33f * x, 0.33f * y, t.seed, 5, 0.7f);
+  const float stones = fractal_noise(24 * x, 24 * y, t.seed + 1, 2, 0.8f);
+  const float crack = smooth_step(0.010f, 0.0f, std::abs(fractal_noise(0.45f * x, 0.45f * y, t.seed + 2, 4)));
+  const float spot = scattered_motifs(x, y, 0.6f, 0.2f, t.seed + 3);
+  const float a = t.shade * (1 + 0.40f * stains + 0.28f * stones + 0.06f * speckle(x, y, t.seed + 4));
+  return a * (1 + 0.22f * spot) * (1 - 0.45f * crack);
+}
+
+float paving(const Texture& t, float x, float y) {
+  constexpr float kSide = 0.45f, kJoint = 0.012f;
+  const std::int32_t row = floor_int(y / kSide);
+  const Cell c = cell_at(x + kSide * unit(row, 1, t.seed), y, kSide, kSide);
+  const Seed cell_seed = hash(c.column, c.row, t.seed + 1);
+  const float edge = std::min(std::min(c.x, kSide - c.x), std::min(c.y, kSide - c.y));
+  const float stones = fractal_noise(16 * x, 16 * y, t.seed + 2, 3, 0.7f),
+              dirt = fractal_noise(0.7f * x, 0.7f * y, t.seed + 3, 4);
+  const float a = t.shade * mix(0.80f, 1.18f, unit(cell_seed)) * (1 + 0.25f * stones + 0.3f * dirt);
+  return mix(0.5f * t.shade, a, smooth_step(0.3f * kJoint, kJoint, edge));
+}
+
 float pattern(const Texture& t, float x, float y, float width, float height) {
   switch (t.material) {
     case Material::kPlain:
@@ -322,7 +343,11 @@ float pattern(const Texture& t, float x, float y, float width, float height) {
     case Material::kSky:
       return clouds(t, x, y);
     case Material::kHorizon:
-      return horizon(t, x, y);
+    case Material::kHills:
+      return t.material == Material::kHorizon ? horizon(t, x, y) : horizon(t, x / 6, y / 6);
+    case Material::kAsphalt:
+    case Material::kPaving:
+      return t.material == Material::kAsphalt ? asphalt(t, x, y) : paving(t, x, y);
     case Material::kLamp:
       return 0.9f;
   }

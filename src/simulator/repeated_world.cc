@@ -25,10 +25,6 @@ void add_copy(const Building& part, Turn turn, const Vector2d& shift, Building& 
   for (const Lamp& lamp : part.lamps) to.lamps.push_back({rotated(lamp.position) + by, lamp.intensity});
 }
 
-Texture texture(Material material, float shade, Random& random) {
-  return {material, static_cast<std::uint32_t>(random.next()), shade};
-}
-
 void add_floor_and_ceiling(Building& b, const Vector2d& low, const Vector2d& size, Material floor, Random& random) {
   b.surfaces.push_back({at_height(low, 0), {size.x(), 0, 0}, {0, size.y(), 0}, texture(floor, 0.40f, random)});
   b.surfaces.push_back(

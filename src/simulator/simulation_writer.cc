@@ -4,17 +4,21 @@
 #include <png.h>
 
 #include <cmath>
+#include <fstream>
 #include <mutex>
 #include <optional>
 #include <string>
 #include <system_error>
+#include <utility>
 #include <vector>
 
+#include "base/assert.h"
 #include "base/atomic_file.h"
 #include "evaluation/trajectory_file.h"
 #include "rig_formats/euroc_sensor.h"
 #include "rig_formats/rig_file.h"
-#include "simulator/clearance.h"
+#include "simulator/recorder.h"
+#include "simulator/request_checks.h"
 
 namespace bslam::simulator {
 namespace {
@@ -26,48 +30,6 @@ constexpr int kListsVersion = 2;  // version of the other files; to be increment
 constexpr double kGroundTruthRate = 200.0;  // Hz
 constexpr const char* kPartial = ".partial";
 constexpr const char* kComplete = ".complete";
-
-Status check(const SimulationRequest& r) {
-  const auto out_of_range = [](const char* key, double found, const char* expected) {
-    return Error{"", key, fmt::format("{}", found), expected};
-  };
-  const auto within = [](double value, double low, double high) { return value >= low && value <= high; };
-  if (!(within(r.recording.duration_s, 1e-3, 86400)))
-    return out_of_range("duration", r.recording.duration_s, "seconds in (0, 86400]");
-  if (!(within(r.recording.rate_hz, 1e-3, 1000)))
-    return out_of_range("rate", r.recording.rate_hz, "images per second in (0, 1000]");
-  if (!within(r.recording.exposure_s, 0, 1))
-    return out_of_range("exposure-ms", 1e3 * r.recording.exposure_s, "milliseconds in [0, 1000]");
-  for (const Fault& f : r.recording.faults) {
-    if (f.from_s >= r.recording.duration_s) {
-      return Error{"", "faults", fmt::format("{} from {} s", fault_name(f.type), f.from_s),
-                   fmt::format("a start time within the {} s of the recording", r.recording.duration_s)};
-    }
-  }
-  if (!within(r.imaging.noise, 0, 1000)) return out_of_range("noise", r.imaging.noise, "a factor in [0, 1000]");
-  if (!within(to_seconds(r.recording.start_ns), 0, 4e9))
-    return out_of_range("start", to_seconds(r.recording.start_ns), "seconds in [0, 4e9]");
-  if (!within(r.tour.speed_mps, 0, 5))
-    return out_of_range("speed", r.tour.speed_mps, "metres per second in [0, 5] (0: walking pace)");
-  if (!within(r.tour.laps, 0, 1000))
-    return out_of_range("laps", r.tour.laps, "a number in [0, 1000] (0: determined by the walking pace)");
-  if (r.tour.laps > 0 && r.tour.speed_mps > 0) {
-    return Error{"", "speed", fmt::format("{} with {} laps", r.tour.speed_mps, r.tour.laps),
-                 "either a speed or a number of laps"};
-  }
-  return {};
-}
-
-Status check_clearance(const SimulationRequest& r, const Building& building, const synthetic::Trajectory& tour) {
-  const auto collision = first_collision(building.surfaces, r.rig, tour, r.recording.duration_s);
-  if (!collision) return {};
-  const std::string& camera = r.rig.camera(collision->camera).name;
-  const std::string place = collision->distance > 0 ? fmt::format("{:.3f} m from a surface", collision->distance)
-                                                    : std::string("behind a wall, the floor or the ceiling");
-  return Error{"", "rig", fmt::format("camera {} {} after {:.2f} s", camera, place, collision->time_s),
-               fmt::format("cameras that keep {} m from all surfaces: a smaller rig{}", kCameraClearance,
-                           r.kind == WorldKind::kOutdoor ? "" : ", or --world outdoor")};
-}
 
 Status make_folder(const fs::path& folder) {
   std::error_code code;
@@ -134,29 +96,62 @@ Status write_image(const fs::path& file, const image::Image& image) {
   return write_atomically(file, {png.data(), size});
 }
 
-// Writes all images that do not exist yet. Returns false if a stop was requested before all were written.
-Result<bool> write_images(const SimulationRequest& request, const std::vector<Shot>& shots, const Recorder& recorder,
-                          ThreadPool& pool, const SimulationProgress& progress, const std::stop_token& stop) {
-  std::mutex mutex;
-  std::size_t done = 0;
-  std::optional<Error> failure;
-  pool.for_each(shots.size(), [&](std::size_t i) {
-    {
-      const std::lock_guard lock(mutex);
-      if (failure || stop.stop_requested()) return;
+// Writes the images of a recording, section by section.
+class ImageWriter {
+ public:
+  ImageWriter(const SimulationRequest& request, const Scenery& scenery, const std::vector<Shot>& shots,
+              ThreadPool& pool, const SimulationProgress& progress, std::stop_token stop)
+      : request_(request), scenery_(scenery), shots_(shots), pool_(pool), progress_(progress), stop_(std::move(stop)) {}
+
+  // Writes all images that do not exist yet. Returns false if a stop was requested before all were written.
+  Result<bool> write() {
+    std::vector<std::vector<std::size_t>> missing(scenery_.section_ends.size());  // by section, in order
+    for (std::size_t i = 0; i < shots_.size(); ++i) {
+      std::error_code code;
+      if (shots_[i].written && !fs::exists(image_file(request_.folder, shots_[i]), code)) {
+        missing[scenery_.section_at(shots_[i].scene_time_s)].push_back(i);
+      } else {
+        ++done_;
+      }
     }
-    const fs::path file = image_file(request.folder, shots[i]);
-    Status status;
-    std::error_code code;
-    if (shots[i].written && !fs::exists(file, code)) status = write_image(file, recorder.render(shots[i]));
-    const std::lock_guard lock(mutex);
-    ++done;
-    if (!status && !failure) failure = status.error();
-    if (progress) progress(done, shots.size());
-  });
-  if (failure) return *failure;
-  return done == shots.size();
-}
+    if (done_ > 0 && progress_) progress_(done_, shots_.size());
+    for (std::size_t section = 0; section < missing.size() && !failure_ && !stop_.stop_requested(); ++section) {
+      if (!missing[section].empty()) write_section(section, missing[section]);
+    }
+    if (failure_) return *failure_;
+    return done_ == shots_.size();
+  }
+
+ private:
+  void write_section(std::size_t section, const std::vector<std::size_t>& missing) {
+    const World world(scenery_.building(section), scenery_.world, pool_, stop_);
+    if (stop_.stop_requested()) return;
+    const Recorder recorder(world, request_.rig, scenery_.trajectory, request_.imaging, request_.recording.exposure_s,
+                            pool_);
+    pool_.for_each(missing.size(), [&](std::size_t k) {
+      {
+        const std::lock_guard lock(mutex_);
+        if (failure_ || stop_.stop_requested()) return;
+      }
+      const Shot& shot = shots_[missing[k]];
+      const Status status = write_image(image_file(request_.folder, shot), recorder.render(shot));
+      const std::lock_guard lock(mutex_);
+      ++done_;
+      if (!status && !failure_) failure_ = status.error();
+      if (progress_) progress_(done_, shots_.size());
+    });
+  }
+
+  const SimulationRequest& request_;
+  const Scenery& scenery_;
+  const std::vector<Shot>& shots_;
+  ThreadPool& pool_;
+  const SimulationProgress& progress_;
+  std::stop_token stop_;
+  std::mutex mutex_;
+  std::size_t done_ = 0;  // images that exist, or are missing on purpose
+  std::optional<Error> failure_;
+};
 
 std::string image_list(const std::vector<Shot>& shots, std::size_t camera) {
   std::string text = "#timestamp [ns],filename\n";
@@ -175,26 +170,34 @@ std::string fault_list(const std::vector<Shot>& shots) {
   return text;
 }
 
-std::string body_truth(const SimulationRequest& request, const synthetic::Trajectory& trajectory) {
-  std::string text =
-      "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z [], v_RS_R_x [m "
-      "s^-1], "
-      "v_RS_R_y [m s^-1], v_RS_R_z [m s^-1], b_w_RS_S_x [rad s^-1], b_w_RS_S_y [rad s^-1], b_w_RS_S_z [rad s^-1], "
-      "b_a_RS_S_x [m s^-2], b_a_RS_S_y [m s^-2], b_a_RS_S_z [m s^-2]\n";
+// Writes the poses of the body in pieces, since those of long recordings would need much memory.
+Status write_body_truth(const fs::path& file, const SimulationRequest& request,
+                        const synthetic::Trajectory& trajectory) {
+  fs::path part = file;
+  part += ".part";
+  std::ofstream out(part, std::ios::binary);
+  out << "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z [], v_RS_R_x "
+         "[m s^-1], v_RS_R_y [m s^-1], v_RS_R_z [m s^-1], b_w_RS_S_x [rad s^-1], b_w_RS_S_y [rad s^-1], b_w_RS_S_z "
+         "[rad s^-1], b_a_RS_S_x [m s^-2], b_a_RS_S_y [m s^-2], b_a_RS_S_z [m s^-2]\n";
   const auto count = static_cast<std::size_t>(std::lround(request.recording.duration_s * kGroundTruthRate));
   for (std::size_t i = 0; i <= count; ++i) {
     const TimeNs since_start = from_seconds(static_cast<double>(i) / kGroundTruthRate);
     const geometry::SE3 T = trajectory.T_world_body(to_seconds(since_start));
     const Eigen::Vector3d p = T.translation(), v = trajectory.velocity(to_seconds(since_start));
     const Eigen::Quaterniond q = T.rotation();
-    text += fmt::format("{},{:.9f},{:.9f},{:.9f},{:.12f},{:.12f},{:.12f},{:.12f},{:.9f},{:.9f},{:.9f},0,0,0,0,0,0\n",
-                        request.recording.start_ns + since_start, p.x(), p.y(), p.z(), q.w(), q.x(), q.y(), q.z(),
-                        v.x(), v.y(), v.z());
+    out << fmt::format("{},{:.9f},{:.9f},{:.9f},{:.12f},{:.12f},{:.12f},{:.12f},{:.9f},{:.9f},{:.9f},0,0,0,0,0,0\n",
+                       request.recording.start_ns + since_start, p.x(), p.y(), p.z(), q.w(), q.x(), q.y(), q.z(), v.x(),
+                       v.y(), v.z());
   }
-  return text;
+  out.close();
+  std::error_code code;
+  if (out) fs::rename(part, file, code);
+  if (!out || code) return Error{file.string(), "", "a file that cannot be written", "space on the disk"};
+  return {};
 }
 
-Status write_lists(const SimulationRequest& request, const std::vector<Shot>& shots, const Recorder& recorder) {
+Status write_lists(const SimulationRequest& request, const std::vector<Shot>& shots,
+                   const synthetic::Trajectory& trajectory) {
   const fs::path& folder = request.folder;
   const camera::Rig& rig = request.rig;
   const bool sensors = rig_formats::euroc_holds_models(rig);  // rig.yaml supports all models
@@ -212,14 +215,15 @@ Status write_lists(const SimulationRequest& request, const std::vector<Shot>& sh
   }
   const fs::path truth = folder / "mav0" / "state_groundtruth_estimate0";
   if (Status s = make_folder(truth); !s) return s;
-  if (Status s = write_atomically(truth / "data.csv", body_truth(request, recorder.trajectory())); !s) return s;
+  if (Status s = write_body_truth(truth / "data.csv", request, trajectory); !s) return s;
   evaluation::Trajectory of_camera0;
   const TimeNs offset = rig.camera(std::size_t{0}).time_offset_ns;
   for (const Shot& shot : shots) {
     if (shot.camera != 0) continue;
     // The pose at the true time of the stamp, regardless of faults.
     const TimeNs time_ns = shot.stamp_ns + offset;
-    of_camera0.push_back({time_ns, recorder.T_world_cam(0, to_seconds(time_ns - request.recording.start_ns))});
+    const geometry::SE3 T_world_body = trajectory.T_world_body(to_seconds(time_ns - request.recording.start_ns));
+    of_camera0.push_back({time_ns, T_world_body * rig.body_from_cam(0)});
   }
   if (Status s =
           evaluation::write_trajectory(folder / "groundtruth_cam0.tum", of_camera0, evaluation::TrajectoryFormat::kTum);
@@ -230,6 +234,12 @@ Status write_lists(const SimulationRequest& request, const std::vector<Shot>& sh
 }
 
 }  // namespace
+
+Result<double> drive_duration(const SimulationRequest& request) {
+  BSLAM_ASSERT(request.kind == WorldKind::kTown, "only drives through the town have a duration of their own");
+  if (const Status s = check_tour(request); !s) return s.error();
+  return make_scenery(request.kind, request.seed, request.tour, request.world).section_ends.back();
+}
 
 std::string simulation_digest(const SimulationRequest& r) {
   std::string text = fmt::format("{} {} {} {} {} {}\n", kWorldVersion, r.seed, r.recording.duration_s,
@@ -245,6 +255,7 @@ std::string simulation_digest(const SimulationRequest& r) {
   }
   if (r.kind != WorldKind::kBuilding) text += fmt::format("world {}\n", static_cast<int>(r.kind));
   if (r.tour.back) text += "back\n";
+  if (r.tour.length_m > 0) text += fmt::format("length {}\n", r.tour.length_m);
   text += rig_formats::rig_to_yaml(r.rig);
   std::uint64_t digest = 0xcbf29ce484222325ull;  // FNV-1a
   for (const char c : text) digest = (digest ^ static_cast<unsigned char>(c)) * 0x100000001b3ull;
@@ -253,12 +264,11 @@ std::string simulation_digest(const SimulationRequest& r) {
 
 Result<SimulationOutcome> write_simulation(const SimulationRequest& request, ThreadPool& pool,
                                            const SimulationProgress& progress, std::stop_token stop) {
-  if (const Status s = check(request); !s) return s.error();
-  const Building building = make_building(request.kind, request.seed);
-  TourOptions tour_options = request.tour;
-  tour_options.duration_s = request.recording.duration_s;
-  const synthetic::Trajectory tour = make_tour(building, tour_options);
-  if (const Status s = check_clearance(request, building, tour); !s) return s.error();
+  if (const Status s = check_request(request); !s) return s.error();
+  TourOptions tour = request.tour;
+  tour.duration_s = request.recording.duration_s;
+  const Scenery scenery = make_scenery(request.kind, request.seed, tour, request.world);
+  if (const Status s = check_scenery(request, scenery); !s) return s.error();
   const std::string digest = simulation_digest(request);
   const auto state = prepare_folder(request, digest);
   if (!state) return state.error();
@@ -271,13 +281,10 @@ Result<SimulationOutcome> write_simulation(const SimulationRequest& request, Thr
     std::error_code code;
     for (const Shot& shot : shots) fs::remove(image_file(request.folder, shot), code);
   }
-  const World world(building, request.world, pool, stop);
-  if (stop.stop_requested()) return SimulationOutcome::kInterrupted;
-  const Recorder recorder(world, request.rig, tour, request.imaging, request.recording.exposure_s, pool);
-  const auto all = write_images(request, shots, recorder, pool, progress, stop);
+  const auto all = ImageWriter(request, scenery, shots, pool, progress, stop).write();
   if (!all) return all.error();
   if (!*all) return SimulationOutcome::kInterrupted;
-  if (const Status s = write_lists(request, shots, recorder); !s) return s.error();
+  if (const Status s = write_lists(request, shots, scenery.trajectory); !s) return s.error();
   if (const Status s = write_atomically(request.folder / kComplete, complete_mark(digest) + "\n"); !s) return s.error();
   std::error_code code;
   fs::remove(request.folder / kPartial, code);

@@ -8,7 +8,7 @@
 
 namespace bslam::simulator {
 
-double distance_to_surfaces(const std::vector<Surface>& surfaces, const Vector3d& point) {
+double distance_to_surfaces(std::span<const Surface> surfaces, const Vector3d& point) {
   double best = std::numeric_limits<double>::infinity();
   for (const Surface& s : surfaces) {
     const Vector3d d = point - s.origin;

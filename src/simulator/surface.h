@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "simulator/material.h"
@@ -21,10 +22,11 @@ struct Surface {
   // Position of the rectangle in the pattern of its texture, in metres. The rectangles of one wall have the same
   // texture and different pattern origins, so that the pattern continues across them.
   Vector2d pattern_origin = Vector2d::Zero();
+  double min_texel = 0;  // metres; for surfaces that are hardly seen, texels are at least this large
 };
 
 // Returns the distance in metres from a point to the nearest surface, or infinity if there are no surfaces.
-double distance_to_surfaces(const std::vector<Surface>& surfaces, const Vector3d& point);
+double distance_to_surfaces(std::span<const Surface> surfaces, const Vector3d& point);
 
 // A box: the centre of its bottom face, the side lengths along its local x, y and z axes, and its rotation about z.
 struct Box {

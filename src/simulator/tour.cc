@@ -6,6 +6,7 @@
 
 #include "base/assert.h"
 #include "base/random.h"
+#include "simulator/closed_path.h"
 #include "synthetic/sway.h"
 
 namespace bslam::simulator {
@@ -23,32 +24,6 @@ constexpr double kFastestPace = 1.5;
 constexpr double kTurnRound_s = 4.0,
                  kHalt_s = 1.0;        // seconds for turning on the spot, and for stopping before the turn
 constexpr double kTangentReach = 0.4;  // metres of path on either side that determine the viewing direction
-
-// A closed polyline, parametrised by arc length.
-class Loop {
- public:
-  explicit Loop(const std::vector<Vector2d>& points) : points_(points) {
-    at_.push_back(0);
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      at_.push_back(at_.back() + (points[(i + 1) % points.size()] - points[i]).norm());
-    }
-  }
-  double length() const { return at_.back(); }
-  Vector2d operator()(double arc) const {
-    arc -= length() * std::floor(arc / length());
-    const auto next = std::upper_bound(at_.begin() + 1, at_.end() - 1, arc);
-    const std::size_t i = static_cast<std::size_t>(next - at_.begin()) - 1;
-    const double fraction = (arc - at_[i]) / (at_[i + 1] - at_[i]);
-    return points_[i] + fraction * (points_[(i + 1) % points_.size()] - points_[i]);
-  }
-  Vector2d tangent(double arc) const {
-    return ((*this)(arc + kTangentReach) - (*this)(arc - kTangentReach)).normalized();
-  }
-
- private:
-  const std::vector<Vector2d>& points_;
-  std::vector<double> at_;  // arc length at each point, and total length
-};
 
 // Returns the duration of walking in one direction, in seconds.
 double walking_s(const TourOptions& o) {
@@ -82,7 +57,7 @@ Progress out_and_back(const TourOptions& o, double laps, double time_s) {
 
 Trajectory make_tour(const simulator::Building& building, const TourOptions& options) {
   BSLAM_ASSERT(options.duration_s > 0, "duration must be positive");
-  const Loop loop(building.tour);
+  const ClosedPath loop(building.tour);
   const double laps = laps_of(options, loop.length());
   Random base_random(options.seed, "sway");
   const Sway base(base_random);
@@ -103,7 +78,8 @@ Trajectory make_tour(const simulator::Building& building, const TourOptions& opt
     const Offsets o = offsets_at(base, lap_sway[static_cast<std::size_t>(lap + 1)], phase);
     // The speed varies by 10 %, equally in every lap.
     const double arc = loop.length() * (phase + 0.1 / (6 * pi) * std::sin(6 * pi * phase));
-    const Vector2d tangent = loop.tangent(arc), place = loop(arc) + o.lateral * Vector2d(-tangent.y(), tangent.x());
+    const Vector2d tangent = loop.tangent(arc, kTangentReach),
+                   place = loop(arc) + o.lateral * Vector2d(-tangent.y(), tangent.x());
     double yaw = std::atan2(tangent.y(), tangent.x());
     yaw += 2 * pi * std::round((last_yaw - yaw) / (2 * pi));
     last_yaw = yaw;

@@ -12,6 +12,7 @@ struct TourOptions {
   // Mean speed; 0: determined by duration and laps. With a speed but no laps, the tour may end anywhere.
   double speed_mps = 0;
   std::uint64_t seed = 1;  // seed of sway and viewing directions
+  double length_m = 0;     // metres: of a drive through the town; other tours have none
   bool back = false;       // turns around after half of the duration and returns along the same path
 };
 

@@ -16,6 +16,10 @@ void add_wall_piece(Building& b, const Face& f, double from, double to, double l
 
 }  // namespace
 
+Texture texture(Material material, float shade, Random& random) {
+  return {material, static_cast<std::uint32_t>(random.next()), shade};
+}
+
 Vector2d centre_of(const Door& d) {
   return d.along == Axis::kX ? Vector2d(d.centre, d.wall) : Vector2d(d.wall, d.centre);
 }

@@ -36,6 +36,9 @@ struct Face {
 Vector2d centre_of(const Door& door);
 inline Vector3d at_height(const Vector2d& p, double z) { return {p.x(), p.y(), z}; }
 
+// A material of mean albedo `shade` with a random seed.
+Texture texture(Material material, float shade, Random& random);
+
 // Returns the south, east, north and west face of a room. The centre lines of its walls are at `low` and `high`.
 std::array<Face, 4> faces_of(const Room& room, const Vector2d& low, const Vector2d& high);
 

@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <limits>
@@ -9,6 +10,7 @@
 
 #include "base/assert.h"
 #include "simulator/embree.h"
+#include "simulator/texel.h"
 
 namespace bslam::simulator {
 namespace {
@@ -20,13 +22,16 @@ constexpr double kOffSurface = 0.006;  // metres between a surface and the origi
 constexpr double kMinLight = 0.012;    // minimum irradiance by a lamp for which its shadow is computed
 const Vector3d kLampPoints[] = {{1, 0.2, 0}, {-0.3, 0.9, 0.1}, {-0.9, -0.4, -0.1}, {0.2, -0.9, 0}, {0, 0, -0.2}};
 constexpr float kLampLight = 2.2f, kDaylight = 0.75f, kSkyLight = 0.95f;
-constexpr double kCoarsest = 4.0;  // largest texel size relative to the smallest, except far away
+constexpr double kSunReach = 80.0;     // metres within which surfaces cast shadows of the sun
+constexpr double kLeastCoarse = 0.25;  // metres: texels of surfaces that seem to be hidden by others are larger
+constexpr double kCoarser = 4.0;       // factor on the texels of surfaces that seem to be hidden by others
+constexpr double kCoarsest = 4.0;      // largest texel size relative to the smallest, except far away
 
 // The light of materials that emit it.
 std::optional<float> uniform_light(Material material) {
   if (material == Material::kLamp) return kLampLight;
   if (material == Material::kWindow) return kDaylight;
-  if (material == Material::kSky || material == Material::kHorizon) return kSkyLight;
+  if (material == Material::kSky || material == Material::kHorizon || material == Material::kHills) return kSkyLight;
   return std::nullopt;
 }
 
@@ -50,26 +55,6 @@ RTCRay make_ray(const Vector3d& origin, const Vector3d& direction, double near, 
   ray.tfar = static_cast<float>(far);
   ray.mask = ~0u;
   return ray;
-}
-
-struct TexelGrid {
-  std::int32_t width, height;
-};
-
-// The next level of a texture pyramid. Texels hold square roots of albedo: each texel of `out` is the root of the mean
-// square of the four texels of `in` that it covers; the last row and column of `in` are repeated.
-void halve(const std::uint8_t* in, const TexelGrid& fine, std::uint8_t* out, const TexelGrid& coarse) {
-  const auto square = [&](std::int32_t x, std::int32_t y) {
-    const std::int32_t v = in[std::min(y, fine.height - 1) * fine.width + std::min(x, fine.width - 1)];
-    return v * v;
-  };
-  for (std::int32_t y = 0; y < coarse.height; ++y) {
-    for (std::int32_t x = 0; x < coarse.width; ++x) {
-      const std::int32_t sum =
-          square(2 * x, 2 * y) + square(2 * x + 1, 2 * y) + square(2 * x, 2 * y + 1) + square(2 * x + 1, 2 * y + 1);
-      out[y * coarse.width + x] = static_cast<std::uint8_t>(0.5f * std::sqrt(static_cast<float>(sum)) + 0.5f);
-    }
-  }
 }
 
 }  // namespace
@@ -114,7 +99,7 @@ struct World::Scene {
 World::World(Building building, const WorldOptions& options, ThreadPool& pool, std::stop_token stop)
     : building_(std::move(building)) {
   scene_ = std::make_unique<Scene>(building_.surfaces);
-  lay_out(options);
+  lay_out(options, pool);
   bake_albedo(pool, stop);
   bake_light(options, pool, stop);
 }
@@ -123,9 +108,35 @@ World::~World() = default;
 World::World(World&&) noexcept = default;
 World& World::operator=(World&&) noexcept = default;
 
-std::optional<double> World::texel_of(const Surface& s, double finest) const {
-  constexpr double kTexelPerDistance = 0.002;  // radians; about one pixel of the default cameras
-  constexpr double kFar = 10.0;                // metres; surfaces of the indoor worlds are nearer
+bool World::hidden_by_others(const Surface& s) const {
+  constexpr std::size_t kPlaces = 16;  // of the tour
+  constexpr std::array<std::array<double, 2>, 5> kPoints = {
+      {{0.5, 0.5}, {0.1, 0.9}, {0.9, 0.9}, {0.1, 0.1}, {0.9, 0.1}}};
+  const std::size_t step = std::max<std::size_t>(1, building_.tour.size() / kPlaces);
+  const Vector3d n = unit_normal(s);
+  for (const auto& [a, b] : kPoints) {
+    const Vector3d point = s.origin + a * s.u + b * s.v + kOffSurface * n;
+    for (std::size_t i = 0; i < building_.tour.size(); i += step) {
+      const Vector2d& place = building_.tour[i];
+      const Vector3d eye(place.x(), place.y(), 0.5 * (Building::kTourLow + Building::kTourHigh));
+      if ((eye - point).dot(n) > 0 && !blocked(point, eye)) return false;
+    }
+  }
+  return true;
+}
+
+std::vector<std::optional<double>> World::texel_sizes(const WorldOptions& options, ThreadPool& pool) const {
+  std::vector<std::optional<double>> sizes(building_.surfaces.size());
+  constexpr std::size_t kTogether = 256;  // surfaces
+  pool.for_each((sizes.size() + kTogether - 1) / kTogether, [&](std::size_t part) {
+    for (std::size_t i = part * kTogether; i < std::min(sizes.size(), (part + 1) * kTogether); ++i)
+      sizes[i] = texel_of(building_.surfaces[i], options);
+  });
+  return sizes;
+}
+
+std::optional<double> World::texel_of(const Surface& s, const WorldOptions& options) const {
+  constexpr double kFar = 10.0;  // metres; surfaces of the indoor worlds are nearer
   const Vector3d n = unit_normal(s);
   bool seen = building_.tour.empty();
   double nearest = seen ? 0.0 : std::numeric_limits<double>::infinity();
@@ -141,20 +152,23 @@ std::optional<double> World::texel_of(const Surface& s, double finest) const {
     }
   }
   if (!seen) return std::nullopt;
-  if (nearest > kFar) return std::max(kTexelPerDistance * nearest, finest);
-  return std::clamp(kTexelPerDistance * nearest, finest, kCoarsest * finest);
+  const double farthest = nearest > kFar ? std::numeric_limits<double>::infinity() : kCoarsest * options.texel;
+  const double texel = std::max(std::clamp(options.texel_per_distance * nearest, options.texel, farthest), s.min_texel);
+  const bool uncertain = options.hiding_distance > 0 && nearest > options.hiding_distance;
+  return uncertain && hidden_by_others(s) ? std::max(kCoarser * texel, kLeastCoarse) : texel;
 }
 
-void World::lay_out(const WorldOptions& options) {
+void World::lay_out(const WorldOptions& options, ThreadPool& pool) {
   std::uint32_t texels = 0, samples = 0;
-  for (const Surface& s : building_.surfaces) {
+  const std::vector<std::optional<double>> sizes = texel_sizes(options, pool);
+  for (std::size_t i = 0; i < sizes.size(); ++i) {
+    const Surface& s = building_.surfaces[i];
     Baked b{};
     b.normal = unit_normal(s).cast<float>();
     const double w = s.u.norm(), h = s.v.norm();
-    constexpr double kHiddenTexel = 0.25;  // metres
-    const std::optional<double> wanted = texel_of(s, options.texel);
-    const double texel = wanted.value_or(kHiddenTexel);
-    b.hidden = !wanted.has_value();
+    const double texel = sizes[i].value_or(options.hidden_texel);
+    b.hidden = !sizes[i].has_value();
+    b.samples = b.hidden || uniform_light(s.texture.material) ? 1 : samples_per_texel(options.sample_spacing, texel);
     b.texels_per_m = static_cast<float>(1 / texel);
     b.width = std::max(1, static_cast<std::int32_t>(std::lround(w / texel)));
     b.height = std::max(1, static_cast<std::int32_t>(std::lround(h / texel)));
@@ -195,14 +209,13 @@ void World::bake_albedo(ThreadPool& pool, const std::stop_token& stop) {
     const Rows& rows = work[item];
     const Surface& s = building_.surfaces[rows.surface];
     const Baked& b = baked_[rows.surface];
-    const auto w = static_cast<float>(s.u.norm()), h = static_cast<float>(s.v.norm());
-    const auto x0 = static_cast<float>(s.pattern_origin.x()), y0 = static_cast<float>(s.pattern_origin.y());
+    const Vector2f size(static_cast<float>(s.u.norm()), static_cast<float>(s.v.norm()));
+    const Vector2f texels(static_cast<float>(b.width), static_cast<float>(b.height));
     for (std::int32_t y = rows.from; y < rows.to; ++y) {
       std::uint8_t* out = texels_.data() + b.texel[0] + static_cast<std::size_t>(y) * static_cast<std::size_t>(b.width);
-      const float py = y0 + (static_cast<float>(y) + 0.5f) * h / static_cast<float>(b.height);
       for (std::int32_t x = 0; x < b.width; ++x) {
-        const float px = x0 + (static_cast<float>(x) + 0.5f) * w / static_cast<float>(b.width);
-        out[x] = static_cast<std::uint8_t>(255.0f * std::sqrt(albedo(s.texture, px, py, w, h)) + 0.5f);
+        const float mean = mean_albedo(s, static_cast<float>(x), static_cast<float>(y), size, texels, b.samples);
+        out[x] = static_cast<std::uint8_t>(255.0f * std::sqrt(mean) + 0.5f);
       }
     }
   });
@@ -253,6 +266,11 @@ float World::light_at(const Vector3d& point, const Vector3d& n, int ambient_rays
     int open = 0;
     for (const Vector3d& offset : kLampPoints) open += blocked(start, lamp.position + kLampRadius * offset) ? 0 : 1;
     light += unshadowed * open / static_cast<double>(std::size(kLampPoints));
+  }
+  if (building_.sun) {
+    const double facing = building_.sun->direction.dot(n);
+    const bool lit = facing > 0 && !blocked(start, start + kSunReach * building_.sun->direction);
+    if (lit) light += building_.sun->irradiance * facing;
   }
   int open = 0;
   const Vector3d side = n.unitOrthogonal(), up = n.cross(side);

@@ -14,9 +14,15 @@
 namespace bslam::simulator {
 
 struct WorldOptions {
-  double texel = 0.005;       // metres per texel near the tour; surfaces farther away have larger texels
-  double light_texel = 0.10;  // metres between samples of the light
-  int ambient_rays = 24;      // rays per light sample for ambient occlusion
+  double texel = 0.005;               // metres per texel near the tour; surfaces farther away have larger texels
+  double texel_per_distance = 0.002;  // radians; of surfaces farther away: about one pixel of the default cameras
+  double light_texel = 0.10;          // metres between samples of the light
+  int ambient_rays = 24;              // rays per light sample for ambient occlusion
+  double hidden_texel = 0.25;         // metres per texel of surfaces that face away from the whole tour
+  // Metres; larger texels are means of two samples of the albedo in each direction. 0: of one sample.
+  double sample_spacing = 0;
+  // Metres; surfaces farther from the tour have coarse texels if others hide them. 0: none.
+  double hiding_distance = 0;
 };
 
 // Intersection of a ray with surface `surface`, at origin + a u + b v.
@@ -63,7 +69,8 @@ class World {
     Eigen::Vector3f normal;
     std::int32_t width, height;  // texels of the finest level
     float texels_per_m;
-    bool hidden;  // not visible from the tour, therefore without details and shadows
+    bool hidden;           // not visible from the tour, therefore without details and shadows
+    std::int32_t samples;  // of the albedo per texel, in each direction
     std::int32_t levels;
     std::uint32_t texel[kLevels];            // first texel of each level
     std::int32_t light_width, light_height;  // numbers of samples, including those on the edges
@@ -71,8 +78,12 @@ class World {
   };
 
   // Returns the texel size of a surface in metres, or nullopt if its visible side faces away from the whole tour.
-  std::optional<double> texel_of(const Surface& surface, double finest) const;
-  void lay_out(const WorldOptions& options);
+  std::optional<double> texel_of(const Surface& surface, const WorldOptions& options) const;
+  // Returns the texel sizes of all surfaces.
+  std::vector<std::optional<double>> texel_sizes(const WorldOptions& options, ThreadPool& pool) const;
+  // Whether no ray from some points of a surface reaches the tour.
+  bool hidden_by_others(const Surface& surface) const;
+  void lay_out(const WorldOptions& options, ThreadPool& pool);
   void bake_albedo(ThreadPool& pool, const std::stop_token& stop);
   void bake_light(const WorldOptions& options, ThreadPool& pool, const std::stop_token& stop);
   // Irradiance at a point of a surface with normal `n`.

@@ -14,4 +14,14 @@ Offsets offsets_at(const Sway& base, const Sway& lap_sway, double lap_phase) {
           .roll = 0.08 * both(&Sway::roll)};
 }
 
+Offsets VehicleSway::operator()(double time_s) const {
+  constexpr double kDegree = std::numbers::pi / 180;
+  const double phase = time_s / kPeriod_s;
+  return {.lateral = 0.12 * lateral(phase),
+          .up = 0.025 * up(phase),
+          .yaw = 0.8 * kDegree * yaw(phase),
+          .pitch = 0.5 * kDegree * pitch(phase),
+          .roll = 0.7 * kDegree * roll(phase)};
+}
+
 }  // namespace bslam::synthetic

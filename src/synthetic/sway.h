@@ -52,4 +52,18 @@ struct Offsets {
 // `base` is the same for all laps; `lap_phase` runs from 0 to 1 over a lap.
 Offsets offsets_at(const Sway& base, const Sway& lap_sway, double lap_phase);
 
+// The sway of a vehicle on a street: a few centimetres and tenths of a degree. Periodic over kPeriod_s.
+struct VehicleSway {
+  explicit VehicleSway(Random& random)
+      : lateral(random, {3, 5, 8}),
+        up(random, {37, 53, 71}),
+        yaw(random, {4, 7, 13}),
+        pitch(random, {31, 43, 67}),
+        roll(random, {23, 41, 59}) {}
+  Offsets operator()(double time_s) const;
+  Waves lateral, up, yaw, pitch, roll;
+
+  static constexpr double kPeriod_s = 61.0;
+};
+
 }  // namespace bslam::synthetic

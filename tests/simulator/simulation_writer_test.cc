@@ -259,13 +259,65 @@ TEST(Clearance, FindsTheFirstCameraInAWallOrBehindIt) {
   const synthetic::Trajectory still(std::vector<synthetic::ControlPose>(5, {{0, 0, 1}}), 1.0);
   const double ahead = rig.body_from_cam(0).translation().x();
   const auto wall_at = [](double x) { return std::vector<Surface>{{{x, -2, 0}, {0, 4, 0}, {0, 0, 2}, {}}}; };
-  EXPECT_FALSE(first_collision(wall_at(ahead + 0.06), rig, still, 1));
-  const auto close = first_collision(wall_at(ahead + 0.04), rig, still, 1);
+  EXPECT_FALSE(first_collision(wall_at(ahead + 0.06), rig, still, 0, 1));
+  const auto close = first_collision(wall_at(ahead + 0.04), rig, still, 0, 1);
   ASSERT_TRUE(close);
   EXPECT_NEAR(close->distance, 0.04, 0.02);
-  const auto behind = first_collision(wall_at(ahead - 0.06), rig, still, 1);
+  const auto behind = first_collision(wall_at(ahead - 0.06), rig, still, 0, 1);
   ASSERT_TRUE(behind);
   EXPECT_EQ(behind->distance, 0);
+}
+
+// A drive of two sections with three frames of two small cameras.
+class TownWriter : public SimulationWriter {
+ protected:
+  SimulationRequest drive() const {
+    SimulationRequest r = request();
+    r.kind = WorldKind::kTown;
+    r.tour.length_m = 200;
+    r.recording.duration_s = *drive_duration(r);
+    r.recording.rate_hz = 0.1;
+    r.world = {.texel = 0.1, .texel_per_distance = 0.05, .light_texel = 5, .ambient_rays = 1};
+    return r;
+  }
+};
+
+TEST_F(TownWriter, ContinuesInAnySection) {
+  SimulationRequest whole = drive(), r = drive();
+  EXPECT_NEAR(r.recording.duration_s, 29, 3);
+  whole.folder = folder_ / "whole";
+  ASSERT_TRUE(write_simulation(whole, pool_).ok());
+  std::stop_source source;
+  const auto stop_at_two = [&](std::size_t done, std::size_t) {
+    if (done >= 2) source.request_stop();
+  };
+  EXPECT_EQ(*write_simulation(r, pool_, stop_at_two, source.get_token()), SimulationOutcome::kInterrupted);
+  const fs::path kept = r.folder / "mav0/cam0/data/1000000000.png";
+  const auto written_at = fs::last_write_time(kept);
+  EXPECT_EQ(*write_simulation(r, pool_), SimulationOutcome::kWritten);
+  EXPECT_EQ(fs::last_write_time(kept), written_at);
+  EXPECT_EQ(contents(r.folder), contents(whole.folder));
+}
+
+TEST_F(TownWriter, RejectsRequestsThatDoNotFit) {
+  const SimulationRequest fits = drive();
+  const auto key_of_error = [&](auto change) {
+    SimulationRequest r = fits;
+    change(r);
+    const auto outcome = write_simulation(r, pool_);
+    EXPECT_FALSE(fs::exists(r.folder));
+    return outcome ? std::string("none") : outcome.error().key;
+  };
+  EXPECT_EQ(key_of_error([](SimulationRequest& r) { r.tour.length_m = 150; }), "length");
+  EXPECT_EQ(key_of_error([](SimulationRequest& r) { r.tour.length_m = 2e5; }), "length");
+  EXPECT_EQ(key_of_error([](SimulationRequest& r) { r.tour.length_m = std::nan(""); }), "length");
+  EXPECT_EQ(key_of_error([](SimulationRequest& r) { r.tour.speed_mps = 25; }), "speed");
+  EXPECT_EQ(key_of_error([](SimulationRequest& r) { r.tour.speed_mps = 0.1; }), "speed");
+  EXPECT_EQ(key_of_error([](SimulationRequest& r) { r.tour.laps = 2; }), "laps");
+  EXPECT_EQ(key_of_error([](SimulationRequest& r) { r.tour.back = true; }), "back");
+  EXPECT_EQ(key_of_error([](SimulationRequest& r) { r.recording.duration_s = 100; }), "duration");
+  EXPECT_EQ(key_of_error([](SimulationRequest& r) { r.kind = WorldKind::kOutdoor; }), "length");
+  EXPECT_EQ(key_of_error([](SimulationRequest& r) { r.rig = moved_ahead(r.rig, 20); }), "rig");
 }
 
 TEST_F(SimulationWriter, WorldAndTourHaveTheirOwnSeeds) {
