@@ -10,10 +10,10 @@
 namespace bslam::simulator {
 namespace {
 
-constexpr double kLane = 1.0;        // metres to the right of the middle of the street
-constexpr double kRadius = 7.5;      // metres: of corners
-constexpr double kLoopLength = 600;  // metres: mean length of a loop
-constexpr int kAttempts = 40;        // pieces of street at which a loop is tried
+constexpr double kRightOfMiddle = 1.0;  // metres to the right of the middle of the street
+constexpr double kRadius = 7.5;         // metres: of corners
+constexpr double kLoopLength = 600;     // metres: mean length of a loop
+constexpr int kAttempts = 40;           // pieces of street at which a loop is tried
 
 // A crossing of the streets i and j.
 struct Crossing {
@@ -32,7 +32,7 @@ struct Loop {
 double length_of(const StreetGrid& grid, const Loop& loop) {
   const Vector2d size = grid.crossing(loop.high.i, loop.high.j) - grid.crossing(loop.low.i, loop.low.j);
   constexpr double kShortcut = 4 * (2 - 0.5 * std::numbers::pi) * kRadius;  // by its four rounded corners
-  return 2 * size.sum() - kShortcut + (loop.left ? 8 : -8) * kLane;
+  return 2 * size.sum() - kShortcut + (loop.left ? 8 : -8) * kRightOfMiddle;
 }
 
 // The crossings of a loop in the order of driving, from its lower left one.
@@ -127,7 +127,7 @@ std::vector<Vector2d> corners_of(const StreetGrid& grid, const Walk& walk) {
     const Vector2d here = place(k), in = (here - place(k + walk.size() - 1)).normalized(),
                    out = (place(k + 1) - here).normalized();
     if (in.dot(out) > 0.5) continue;  // straight on
-    corners.push_back(here + kLane * (Vector2d(in.y(), -in.x()) + Vector2d(out.y(), -out.x())));
+    corners.push_back(here + kRightOfMiddle * (Vector2d(in.y(), -in.x()) + Vector2d(out.y(), -out.x())));
   }
   return corners;
 }
