@@ -6,7 +6,7 @@
 #include <numeric>
 
 #include "base/assert.h"
-#include "solver/block_matrix.h"
+#include "matrix/block_matrix.h"
 
 namespace bslam::looping {
 namespace {
@@ -65,9 +65,9 @@ std::vector<int> elimination_order(const PoseGraphProblem& problem) {
   return column;
 }
 
-solver::BlockPattern pattern_of(const PoseGraphProblem& problem, const std::vector<int>& column) {
+matrix::BlockPattern pattern_of(const PoseGraphProblem& problem, const std::vector<int>& column) {
   const auto count = std::count_if(column.begin(), column.end(), [](int c) { return c >= 0; });
-  solver::BlockPattern pattern(static_cast<int>(count));
+  matrix::BlockPattern pattern(static_cast<int>(count));
   for (int c = 0; c < pattern.size(); ++c) pattern.mark(c, c);
   for (const Edge& edge : problem.edges) {
     const auto [low, high] = std::minmax({column[at(edge.a)], column[at(edge.b)]});
@@ -199,8 +199,8 @@ class PoseGraphEquations {
   const PoseGraphProblem& problem_;
   Poses S_world_, trial_;
   std::vector<int> column_;  // per vertex, -1: constant
-  solver::BlockPattern pattern_;
-  solver::BlockMatrix H_;
+  matrix::BlockPattern pattern_;
+  matrix::BlockMatrix H_;
   Eigen::VectorXd rhs_;
   Vector inverse_sigma_;
   std::vector<Sim3> S_b_a_;  // per edge, the measurement's inverse

@@ -16,7 +16,7 @@ constexpr double kMinInformation = 1e-9;  // relative to the information if pose
 // Derivative of the free poses with respect to a growth of the map around the first fixed pose. Images do not
 // distinguish the size of the map from the length of the extrinsics, so the size is held constant.
 Eigen::VectorXd growth(const solver::ReprojectionProblem& problem, const solver::BundleStructure& structure,
-                       const solver::BlockMatrix& frames) {
+                       const matrix::BlockMatrix& frames) {
   const auto fixed = std::find(problem.pose_free.begin(), problem.pose_free.end(), std::uint8_t{0});
   const auto first = static_cast<std::size_t>(fixed - problem.pose_free.begin());
   const geometry::Vector3d centre = fixed == problem.pose_free.end()

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "solver/outer_product.h"
+#include "matrix/outer_product.h"
 
 namespace bslam::solver {
 namespace {
@@ -218,7 +218,7 @@ void BundleEquations::eliminate_point(std::size_t point, double damping) {
     for (std::size_t b = 0; b <= a; ++b) {
       auto S = system_.frames().leading<6>(*block++);
       if (S.outerStride() == 6) {
-        subtract_outer_product(U, U_[b].U, S.data());
+        matrix::subtract_outer_product(U, U_[b].U, S.data());
       } else {
         S.noalias() -= U.lazyProduct(U_[b].U.transpose());
       }

@@ -84,7 +84,7 @@ void for_each_pair(const BundleStructure& s, std::size_t point, const Visit& vis
 }
 
 void number_pairs(BundleStructure& s) {
-  s.pattern = BlockPattern(static_cast<int>(s.pose_of_slot.size()));
+  s.pattern = matrix::BlockPattern(static_cast<int>(s.pose_of_slot.size()));
   for (std::size_t i = 0; i < s.num_points(); ++i) {
     for_each_pair(s, i, [&](int a, int b) { s.pattern.mark(a, b); });
   }

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "solver/block_pattern.h"
+#include "matrix/block_pattern.h"
 #include "solver/bundle_adjuster.h"
 
 namespace bslam::solver {
@@ -32,7 +32,7 @@ struct BundleStructure {
   std::vector<Point> points;  // with a sentinel at the end
   std::vector<int> pose_of_slot;
   std::vector<int> frame_sizes;  // per slot: number of unknowns of the frame, beginning with the six of the pose
-  BlockPattern pattern{0};
+  matrix::BlockPattern pattern{0};
   // Block number of each pair of free groups (a, b), b <= a, of each point, in the order of a, then b.
   std::vector<int> pair_block;
 

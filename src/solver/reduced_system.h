@@ -4,12 +4,14 @@
 //     [ B^T  C ] [x_rig   ] = [r_rig   ].
 #pragma once
 
-#include <Eigen/SparseCholesky>
+#include <Eigen/Core>
 #include <algorithm>
+#include <optional>
 #include <span>
 
 #include "geometry/so3.h"
-#include "solver/block_matrix.h"
+#include "matrix/block_matrix.h"
+#include "matrix/supernodal_cholesky.h"
 
 namespace bslam::solver {
 
@@ -23,10 +25,10 @@ class ReducedSystem {
   enum class Storage { kDense, kSparse };  // storage of the frames' blocks
 
   // `pattern` must be numbered and outlive the system. `frame_sizes`: unknowns of each frame. `rig_size` may be 0.
-  ReducedSystem(const BlockPattern& pattern, std::span<const int> frame_sizes, int rig_size, Storage storage);
+  ReducedSystem(const matrix::BlockPattern& pattern, std::span<const int> frame_sizes, int rig_size, Storage storage);
 
-  BlockMatrix& frames() { return frames_; }  // S
-  const BlockMatrix& frames() const { return frames_; }
+  matrix::BlockMatrix& frames() { return frames_; }  // S
+  const matrix::BlockMatrix& frames() const { return frames_; }
   Border& border() { return border_; }     // B: (frame unknowns, rig unknowns)
   Eigen::MatrixXd& rig() { return rig_; }  // C: lower triangle
   Eigen::VectorXd& rhs() { return rhs_; }  // frames, then rig
@@ -52,22 +54,18 @@ class ReducedSystem {
  private:
   // Whether S is factorised sparsely; without frames it never is.
   bool sparse() const { return storage_ == Storage::kSparse && frames_.rows() > 0; }
-  // Factorises S and returns `use(factor)`.
-  template <class Use>
-  bool with_factor(const Use& use);
   geometry::Matrix6d dense_pose_covariance(int frame) const;
-  template <class Factor>
-  bool solve_with(const Factor& factor, Eigen::VectorXd& delta);
+  // S^-1 B for a vector or a matrix. Valid after factorise().
+  template <class Matrix>
+  Matrix solve_frames(Matrix B) const;
 
   Storage storage_;
-  BlockMatrix frames_;
+  matrix::BlockMatrix frames_;
   Border border_;
   Eigen::MatrixXd rig_, rig_information_;
   Eigen::VectorXd rhs_;
   Eigen::MatrixXd dense_;
-  Eigen::SparseMatrix<double> sparse_;  // lower triangle
-  // Elimination order by approximate minimum degree. Uses Eigen's MPL-2 code only.
-  Eigen::SimplicialLLT<Eigen::SparseMatrix<double>, Eigen::Lower, Eigen::AMDOrdering<int>> sparse_factor_;
+  std::optional<matrix::SupernodalCholesky> sparse_;
 };
 
 }  // namespace bslam::solver

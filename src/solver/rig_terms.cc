@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "solver/row_update.h"
+#include "matrix/row_update.h"
 
 namespace bslam::solver {
 
@@ -107,7 +107,7 @@ void RigTerms::add(const RigObservation& observation, const Matrix23d& A, const 
     const Run& range = ranges[i];
     const double* J_range = J.data() + column;
     const auto add = [&](const double* left, std::ptrdiff_t left_stride, int rows, double* C, std::ptrdiff_t C_stride) {
-      add_product_2({left, left_stride, J_range, stride, rows, range.size}, C, C_stride);
+      matrix::add_product_2({left, left_stride, J_range, stride, rows, range.size}, C, C_stride);
     };
     const Vector2d we = weight * e;
     add(we.data(), 1, 1, &b_(range.unknown), size);
@@ -144,7 +144,7 @@ void RigTerms::eliminate(std::size_t point, const Matrix3d& L, const Vector3d& y
   const Eigen::Index size = b_.size(), frames = border_.rows();
   for (std::size_t a = 0; a < runs.size(); ++a) {
     const auto subtract = [&](const double* left, std::ptrdiff_t left_stride, int rows, double* C) {
-      subtract_product_3({left, left_stride, U0 + runs[a].first, count, rows, runs[a].size}, C, size);
+      matrix::subtract_product_3({left, left_stride, U0 + runs[a].first, count, rows, runs[a].size}, C, size);
     };
     subtract(y.data(), 1, 1, &system.rhs()(frames + runs[a].unknown));
     // the columns of the lower triangle

@@ -1,10 +1,10 @@
-#include "solver/row_update.h"
+#include "matrix/row_update.h"
 
 #include <gtest/gtest.h>
 
 #include <Eigen/Core>
 
-namespace bslam::solver {
+namespace bslam::matrix {
 namespace {
 
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
@@ -33,4 +33,4 @@ TEST(RowUpdate, EqualsTheSumsInOrderOfTheDepth) {
 }
 
 }  // namespace
-}  // namespace bslam::solver
+}  // namespace bslam::matrix

@@ -1,10 +1,10 @@
-#include "solver/outer_product.h"
+#include "matrix/outer_product.h"
 
 #include <cstring>
 
 #include "base/vectorised.h"
 
-namespace bslam::solver {
+namespace bslam::matrix {
 namespace {
 
 using Vector4 = double __attribute__((vector_size(32)));
@@ -41,4 +41,4 @@ void subtract_outer_product(const Eigen::Matrix<double, 6, 3>& Ua, const Eigen::
   subtract(Ua.data(), Ub.data(), S);
 }
 
-}  // namespace bslam::solver
+}  // namespace bslam::matrix

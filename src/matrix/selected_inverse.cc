@@ -1,8 +1,8 @@
-#include "solver/selected_inverse.h"
+#include "matrix/selected_inverse.h"
 
 #include <vector>
 
-namespace bslam::solver {
+namespace bslam::matrix {
 
 // For Z = (L L^T)^-1, the equation L^T Z = L^-1, whose right-hand side is lower triangular, gives column j from the
 // columns behind it:
@@ -46,4 +46,4 @@ Eigen::SparseMatrix<double> selected_inverse(const Eigen::SparseMatrix<double>& 
   return Z;
 }
 
-}  // namespace bslam::solver
+}  // namespace bslam::matrix

@@ -6,9 +6,9 @@
 #include <span>
 #include <vector>
 
-#include "solver/block_pattern.h"
+#include "matrix/block_pattern.h"
 
-namespace bslam::solver {
+namespace bslam::matrix {
 
 class BlockMatrix {
  public:
@@ -52,4 +52,4 @@ class BlockMatrix {
   std::vector<double> values_;
 };
 
-}  // namespace bslam::solver
+}  // namespace bslam::matrix

@@ -1,6 +1,6 @@
-#include "solver/block_matrix.h"
+#include "matrix/block_matrix.h"
 
-namespace bslam::solver {
+namespace bslam::matrix {
 
 BlockMatrix::BlockMatrix(const BlockPattern& pattern, std::span<const int> sizes)
     : pattern_(pattern), offset_(1, 0), column_begin_(sizes.size() + 1, 0) {
@@ -61,4 +61,4 @@ void BlockMatrix::copy_to(Eigen::SparseMatrix<double>& out) const {
   for_each_entry([&](int, int, double value) { *next++ = value; });
 }
 
-}  // namespace bslam::solver
+}  // namespace bslam::matrix

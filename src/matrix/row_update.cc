@@ -1,8 +1,8 @@
-#include "solver/row_update.h"
+#include "matrix/row_update.h"
 
 #include "base/vectorised.h"
 
-namespace bslam::solver {
+namespace bslam::matrix {
 namespace {
 
 BSLAM_VECTORISED void add_2(const SmallProduct& p, double* C, std::ptrdiff_t C_row_stride) {
@@ -33,4 +33,4 @@ void subtract_product_3(const SmallProduct& product, double* C, std::ptrdiff_t C
   subtract_3(product, C, C_row_stride);
 }
 
-}  // namespace bslam::solver
+}  // namespace bslam::matrix

@@ -1,8 +1,8 @@
-#include "solver/outer_product.h"
+#include "matrix/outer_product.h"
 
 #include <gtest/gtest.h>
 
-namespace bslam::solver {
+namespace bslam::matrix {
 namespace {
 
 TEST(OuterProduct, EqualsTheSumsInOrderOfTheColumns) {
@@ -25,4 +25,4 @@ TEST(OuterProduct, EqualsTheSumsInOrderOfTheColumns) {
 }
 
 }  // namespace
-}  // namespace bslam::solver
+}  // namespace bslam::matrix

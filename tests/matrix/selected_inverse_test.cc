@@ -1,4 +1,4 @@
-#include "solver/selected_inverse.h"
+#include "matrix/selected_inverse.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 
 #include "base/random.h"
 
-namespace bslam::solver {
+namespace bslam::matrix {
 namespace {
 
 TEST(SelectedInverse, IsTheInverseWhereTheFactorHasEntries) {
@@ -34,4 +34,4 @@ TEST(SelectedInverse, IsTheInverseWhereTheFactorHasEntries) {
 }
 
 }  // namespace
-}  // namespace bslam::solver
+}  // namespace bslam::matrix

@@ -3,7 +3,7 @@
 
 #include <cstddef>
 
-namespace bslam::solver {
+namespace bslam::matrix {
 
 // A (rows, depth), column by column, and B (depth, columns), row by row; the strides are numbers of elements.
 struct SmallProduct {
@@ -18,4 +18,4 @@ struct SmallProduct {
 void add_product_2(const SmallProduct& product, double* C, std::ptrdiff_t C_row_stride);
 void subtract_product_3(const SmallProduct& product, double* C, std::ptrdiff_t C_row_stride);
 
-}  // namespace bslam::solver
+}  // namespace bslam::matrix

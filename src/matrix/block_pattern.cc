@@ -1,8 +1,8 @@
-#include "solver/block_pattern.h"
+#include "matrix/block_pattern.h"
 
 #include <bit>
 
-namespace bslam::solver {
+namespace bslam::matrix {
 
 BlockPattern::BlockPattern(int size)
     : size_(size), bits_((static_cast<std::size_t>(size) * static_cast<std::size_t>(size) + 63) / 64, 0) {
@@ -28,4 +28,4 @@ int BlockPattern::index(int row, int column) const {
   return before_[at / 64] + std::popcount(bits_[at / 64] & below);
 }
 
-}  // namespace bslam::solver
+}  // namespace bslam::matrix

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace bslam::solver {
+namespace bslam::matrix {
 
 // Lower triangle including the diagonal. Call mark() for all blocks, then number(), then index(), which needs no
 // search.
@@ -35,4 +35,4 @@ class BlockPattern {
   std::vector<Position> positions_;
 };
 
-}  // namespace bslam::solver
+}  // namespace bslam::matrix
