@@ -9,9 +9,9 @@
 namespace bslam::simulator {
 namespace {
 
-constexpr WorldOptions kCoarse{.texel = 0.04, .texel_per_distance = 0.01, .light_texel = 1.0, .ambient_rays = 2};
+constexpr WorldOptions kCoarseSection{.texel = 0.04, .texel_per_distance = 0.01, .light_texel = 1.0, .ambient_rays = 2};
 
-Scenery short_drive() { return make_scenery(WorldKind::kTown, 3, {.seed = 3, .length_m = 300}, kCoarse); }
+Scenery short_drive() { return make_scenery(WorldKind::kTown, 3, {.seed = 3, .length_m = 300}, kCoarseSection); }
 
 camera::Rig small_camera() {
   const camera::Camera camera{
