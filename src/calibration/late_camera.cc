@@ -44,14 +44,16 @@ PairEvidence compare(const camera::Rig& rig, std::size_t i, std::size_t j, const
   return judge_pair(rig, i, j, of_i, of_j);
 }
 
+constexpr int kMinAgreeing = 60;  // matches
+
+double share(const PairEvidence& e) { return e.matches > 0 ? 1.0 * e.agreeing[0] / e.matches : 0.0; }
+
 // What the pair shows, of its second camera; nullopt if images of the same frame fit as well.
 std::optional<LateCamera> judge(const camera::Rig& rig, std::size_t i, std::size_t j,
                                 const std::vector<std::vector<View>>& views, const Part& part) {
-  constexpr int kMinAgreeing = 60;
-  constexpr double kGoodShare = 0.6, kClearly = 1.3, kMuchLarger = 0.15;
+  constexpr double kClearly = 1.3, kMuchLarger = 0.15;
   const PairEvidence same = compare(rig, i, j, views, part, 1);
   if (same.matches < kMinAgreeing) return std::nullopt;
-  const auto share = [](const PairEvidence& e) { return e.matches > 0 ? 1.0 * e.agreeing[0] / e.matches : 0.0; };
   std::optional<LateCamera> out;
   for (const std::size_t frame : {0u, 2u}) {
     const PairEvidence apart = compare(rig, i, j, views, part, frame);
@@ -68,6 +70,17 @@ std::optional<LateCamera> judge(const camera::Rig& rig, std::size_t i, std::size
                      .agreeing_apart = apart.agreeing[0]};
   }
   return out;
+}
+
+// Whether images of the same frame fit outside of the part, as they do before a frame is lost and after it is found
+// again. A wrong rotation looks like an image that is late wherever the rig turns steadily, and fits nowhere.
+bool fits_elsewhere(const camera::Rig& rig, const LateCamera& late, const std::vector<std::vector<View>>& views,
+                    const Part& part) {
+  const std::size_t count = views[late.camera].size() / kTriple;
+  const Part rest = part.begin == 0 ? Part{"", part.end, count} : Part{"", 0, part.begin};
+  const PairEvidence same =
+      compare(rig, std::min(late.camera, late.reference), std::max(late.camera, late.reference), views, rest, 1);
+  return same.agreeing[0] >= kMinAgreeing && share(same) >= kGoodShare;
 }
 
 // The camera that most pairs show to be late in a part of the triples.
@@ -114,7 +127,8 @@ std::optional<LateCamera> find_late_camera(const camera::Rig& rig, std::span<con
                                       {"first quarter", 0, count / 4},
                                       {"last quarter", count - count / 4, count}}};
   for (const Part& part : parts) {
-    if (auto found = find_in_part(rig, views, part)) return found;
+    auto found = find_in_part(rig, views, part);
+    if (found && (part.name.empty() || fits_elsewhere(rig, *found, views, part))) return found;
   }
   return std::nullopt;
 }
@@ -122,8 +136,8 @@ std::optional<LateCamera> find_late_camera(const camera::Rig& rig, std::span<con
 std::string describe_late_camera(const LateCamera& late, const std::string& camera, const std::string& reference) {
   return fmt::format(
       "{}: its images are about one frame {} compared with {}{}: {} of {} matches of images that are one frame apart "
-      "are "
-      "consistent with the calibration, and {} of {} of the same frame: check the numbers or time stamps of its images",
+      "are consistent with the calibration, and {} of {} of the same frame: check the numbers or time stamps of its "
+      "images",
       camera, late.early ? "early" : "late", reference,
       late.part.empty() ? "" : fmt::format(" in the {} of the recording", late.part), late.agreeing_apart,
       late.matches_apart, late.agreeing, late.matches);

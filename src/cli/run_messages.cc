@@ -49,7 +49,7 @@ std::string doubt_text(const session::RunRecord& record) {
     text += fmt::format("{}{} and {}", text.empty() ? "" : ", ", record.cameras[pair.first].name,
                         record.cameras[pair.second].name);
     if (pair.mirrored())
-      text += " show it mirrored left to right";
+      text += " have mirrored images";
     else if (pair.keyframes > 0)
       text += fmt::format(" share {:.1f} % of the features in their common view", 100 * pair.matched_share());
   }

@@ -43,14 +43,12 @@ Result<std::vector<std::vector<image_files::ImageFile>>> collect_images(const Da
     if (!list) return list.error();
     if (auto absent = absent_warning(list->images)) list->warnings.push_back(*std::move(absent));
     for (const std::string& warning : list->warnings) add_once(warning, chosen.warnings);
-    const bool sorted_with_warning = !list->warnings.empty();
     const camera::Camera& camera = chosen.rig.camera(i);
     if (const Status status = check_images(list->images, camera); !status) return status.error();
     if (const auto mask = image_decoding::read_mask(camera); !mask) return mask.error();
     const std::string source = image_files::source_of(list->images.front());
     if (const Status s = convert_time_stamps(request.time_stamps, source, list->images); !s) return s.error();
-    if (auto mixed = interleaved_warning(list->images); mixed && !sorted_with_warning)
-      add_once(*mixed, chosen.warnings);
+    if (auto mixed = interleaved_warning(list->images); mixed && !list->sorted) add_once(*mixed, chosen.warnings);
     if (request.masks) {
       const auto warnings = add_image_masks(*request.masks, chosen.cameras[i], camera, list->images);
       if (!warnings) return warnings.error();

@@ -181,7 +181,7 @@ std::optional<std::string> interleaved_warning(const Images& images) {
   std::vector<TimeNs> intervals;
   for (std::size_t k = 1; k < images.size(); ++k) intervals.push_back(images[k].time_ns - images[k - 1].time_ns);
   const TimeNs usual = usual_interval(intervals);
-  const auto near = [&](TimeNs a, TimeNs b) { return 20 * std::abs(a - b) <= usual; };
+  const auto near = [&](TimeNs a, TimeNs b) { return std::abs(a - b) <= usual / 20; };
   std::size_t regular = 0, run = 0, longest = 0, end = 0;
   for (std::size_t k = 0; k + 1 < intervals.size(); ++k) {
     const TimeNs a = intervals[k], b = intervals[k + 1];
@@ -194,8 +194,7 @@ std::optional<std::string> interleaved_warning(const Images& images) {
   const TimeNs begin_ns = images[end - longest].time_ns, first_ns = images.front().time_ns;
   return fmt::format(
       "{}: from {:.3f} to {:.3f} s there are two images in each interval of {:.1f} ms, {:.1f} and {:.1f} ms apart, as "
-      "if "
-      "the clock was set back during the recording, or two recordings were mixed: poses there are wrong then",
+      "if the clock was set back during the recording, or two recordings were mixed: poses there are wrong then",
       image_files::source_of(images.front()), to_seconds(begin_ns - first_ns),
       to_seconds(images[end + 1].time_ns - first_ns), 1e3 * to_seconds(usual), 1e3 * to_seconds(intervals[end - 1]),
       1e3 * to_seconds(intervals[end]));

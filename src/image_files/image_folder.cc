@@ -75,6 +75,7 @@ ImageList in_time_order(std::vector<ImageFile> images, const std::string& source
   }
   if (std::string text = steps_back_text(images, unit); !text.empty()) {
     list.warnings.push_back(fmt::format("{}: {}", source, text));
+    list.sorted = true;
     std::ranges::stable_sort(images, {}, &ImageFile::time_ns);
   }
   const auto last = std::unique(images.begin(), images.end(),

@@ -34,6 +34,7 @@ std::string source_of(const ImageFile& image);
 struct ImageList {
   std::vector<ImageFile> images;
   std::vector<std::string> warnings;
+  bool sorted = false;  // the images were not in order of time, and a warning says so
 };
 
 // How messages write time stamps: as the whole numbers that they are in a file or in names, or in seconds.

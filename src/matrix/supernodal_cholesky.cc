@@ -89,7 +89,8 @@ int total(const std::vector<int>& begin, const std::vector<int>& rows) {
   return sum;
 }
 
-// Whether `next`, which follows `last`, is stored together with it: few entries are zero then, or the panel is narrow.
+// Whether `next`, which follows `last`, is stored together with it: few more entries are zero then, or the panel is
+// narrow.
 bool belong_together(const Columns& last, const Columns& next, const std::vector<int>& begin) {
   constexpr int kNarrow = 36;         // columns
   constexpr double kFewZeros = 0.15;  // of the entries of the columns that are extended

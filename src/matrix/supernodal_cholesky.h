@@ -13,7 +13,8 @@ namespace bslam::matrix {
 // P A P^T = L L^T with a permutation P of blocks that keeps L sparse (approximate minimum degree, from Eigen's MPL-2
 // code). Neighbouring columns of L with nearly the same rows are a supernode, which is stored as one dense panel, so
 // that nearly all of the work is products of dense matrices (Ng, Peyton: "Block sparse Cholesky algorithms on advanced
-// uniprocessor computers", 1993). The result does not depend on anything but the matrix.
+// uniprocessor computers", 1993). The same matrix gives the same bits on every run; the products of very wide
+// panels may be rounded differently on processors with caches of another size.
 class SupernodalCholesky {
  public:
   // Analyses the pattern, which must be numbered. `sizes`: number of rows of each block row.

@@ -214,9 +214,16 @@ std::string late_text(const RunRecord& record) {
 }
 
 // Warns of pairs of cameras that should see the same things but do not.
+// The contradicted pair with the most matches; if there is none, one that is not contradicted, or the end.
+std::vector<calibration::CameraPair>::const_iterator most_contradicted(
+    const std::vector<calibration::CameraPair>& pairs) {
+  const auto weight = [](const calibration::CameraPair& p) { return p.contradicted ? p.evidence->matches : -1; };
+  return std::ranges::max_element(pairs, {}, weight);
+}
+
 void warn_of_pairs(const RunRecord& record, const std::string& check_command, Warnings& warnings) {
   if (const std::string foreign = foreign_images_text(record); !foreign.empty()) {
-    const bool mirrored = std::ranges::any_of(record.calibration.pairs, &calibration::CameraPair::mirrored);
+    const bool mirrored = most_contradicted(record.calibration.pairs)->mirrored();
     return warn(warnings, "{}. {} ({})", foreign,
                 mirrored ? "Turn off the mirroring of the cameras or of their driver"
                          : "Check which images are of which camera, and the direction of the transforms",
@@ -259,8 +266,7 @@ void warn_of_load(const RunRecord& record, Warnings& warnings) {
 
 std::string foreign_images_text(const RunRecord& record) {
   const std::vector<calibration::CameraPair>& pairs = record.calibration.pairs;
-  const auto weight = [](const calibration::CameraPair& p) { return p.contradicted ? p.evidence->matches : -1; };
-  const auto best = std::ranges::max_element(pairs, {}, weight);
+  const auto best = most_contradicted(pairs);
   if (best == pairs.end() || !best->contradicted) return {};
   const auto others = std::ranges::count(pairs, true, &calibration::CameraPair::contradicted) - 1;
   const std::string names =

@@ -1,8 +1,10 @@
 #include "simulator/simulation_writer.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <png.h>
 
+#include <array>
 #include <cmath>
 #include <fstream>
 #include <mutex>
@@ -256,6 +258,11 @@ std::string simulation_digest(const SimulationRequest& r) {
   if (r.kind != WorldKind::kBuilding) text += fmt::format("world {}\n", static_cast<int>(r.kind));
   if (r.tour.back) text += "back\n";
   if (r.tour.length_m > 0) text += fmt::format("length {}\n", r.tour.length_m);
+  const WorldOptions usual, &w = r.world;
+  const auto others = [](const WorldOptions& o) {
+    return std::array{o.texel_per_distance, o.hidden_texel, o.sample_spacing, o.hiding_distance};
+  };
+  if (others(w) != others(usual)) text += fmt::format("texels {}\n", fmt::join(others(w), " "));
   text += rig_formats::rig_to_yaml(r.rig);
   std::uint64_t digest = 0xcbf29ce484222325ull;  // FNV-1a
   for (const char c : text) digest = (digest ^ static_cast<unsigned char>(c)) * 0x100000001b3ull;

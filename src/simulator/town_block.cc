@@ -139,7 +139,7 @@ void add_park(Building& b, const Area& area, Random& random) {
   const Vector2d size = area.size();
   const auto place = [&](double margin) {
     return Vector2d(area.low +
-                    Vector2d(random.uniform(margin, size.x() - margin), random.uniform(margin, size.y() - margin)));
+                    Vector2d{random.uniform(margin, size.x() - margin), random.uniform(margin, size.y() - margin)});
   };
   const int trees = static_cast<int>(size.prod() / 160);
   for (int i = 0; i < trees; ++i) add_tree(b, place(1.5), random);

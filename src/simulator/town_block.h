@@ -22,7 +22,7 @@ struct PartSeed {
 // Adds a horizontal rectangle at a height. The pattern of its texture has its origin in the origin of the world.
 void add_flat(Building& building, const Area& area, double z, const Texture& look, double min_texel = 0);
 
-// Adds the block within `area`. All parts that a level of detail has are the same in the next one.
+// Adds the block within `area`. Houses and halls are the same in kHouses and kComplete.
 void add_block(Building& building, const Area& area, const PartSeed& seed, Detail detail);
 
 }  // namespace bslam::simulator

@@ -19,8 +19,8 @@ void add_front_box(Building& b, const Facade& f, double at, double z, const Vect
 // A shop on the ground floor: its own front before the facade, windows, a door and a sign.
 void add_shop(Building& b, const Facade& f, Random& random) {
   constexpr double kThickness = 0.12, kHeight = 3.1;
-  const Texture frame = texture(random.below(2) == 0 ? Material::kWood : Material::kPlaster,
-                                static_cast<float>(random.uniform(0.15, 0.6)), random);
+  const Material material = random.below(2) == 0 ? Material::kWood : Material::kPlaster;
+  const Texture frame = texture(material, static_cast<float>(random.uniform(0.15, 0.6)), random);
   add_front_box(b, f, 0.5 * f.length, 0, {f.length - 0.5, kThickness, kHeight}, frame);
   const Facade front{f.start + kThickness * left_of(f.along), f.along, f.length, f.height};
   const double sign = random.uniform(2.5, f.length - 1.5), at = random.uniform(0.4, f.length - 0.6 - sign);
@@ -45,14 +45,18 @@ void add_shop(Building& b, const Facade& f, Random& random) {
 }
 
 // Balconies, a cornice and a pipe.
+void add_balcony(Building& b, const Facade& f, double z, const Texture& look, Random& random) {
+  const double at = random.uniform(1.5, f.length - 1.5), width = random.uniform(1.4, 2.4);
+  add_front_box(b, f, at, z, {width, 0.8, 0.95}, look);
+}
+
 void add_relief(Building& b, const Facade& f, Random& random) {
   const Texture stone = texture(Material::kPlaster, 0.6f, random), metal = texture(Material::kPlain, 0.2f, random);
   add_front_box(b, f, 0.5 * f.length, f.height - 0.35, {f.length - 0.02, 0.22, 0.35}, stone);
   add_front_box(b, f, random.below(2) == 0 ? 0.15 : f.length - 0.15, kKerb, {0.1, 0.1, f.height - 0.5}, metal, 0.02);
   if (random.below(3) != 0) return;
   const Texture look = texture(random.below(2) == 0 ? Material::kPlanks : Material::kPlaster, 0.5f, random);
-  for (double z = 3.2; z + 2.5 < f.height; z += 3.0)
-    add_front_box(b, f, random.uniform(1.5, f.length - 1.5), z, {random.uniform(1.4, 2.4), 0.8, 0.95}, look);
+  for (double z = 3.2; z + 2.5 < f.height; z += 3.0) add_balcony(b, f, z, look, random);
 }
 
 Material house_material(Random& random) {
@@ -70,7 +74,8 @@ void add_front(Building& b, const Facade& f, double low, double high, const Text
 
 void add_town_house(Building& b, const Facade& f, Random& random, Detail detail) {
   constexpr double kSideTexel = 0.03, kBackTexel = 0.15;  // metres; backs are seen through gaps only
-  const Texture wall = texture(house_material(random), static_cast<float>(random.uniform(0.3, 0.62)), random),
+  const Material material = house_material(random);
+  const Texture wall = texture(material, static_cast<float>(random.uniform(0.3, 0.62)), random),
                 roof = texture(Material::kTile, static_cast<float>(random.uniform(0.15, 0.4)), random);
   const Vector2d out = left_of(f.along), middle = f.start + 0.5 * f.length * f.along - 0.5 * kHouseDepth * out;
   const std::size_t first = b.surfaces.size();

@@ -36,13 +36,13 @@ void add_markings(Building& b, const StreetPiece& p, Random& random) {
   if (random.below(3) != 0) add_zebra(b, p, 0.8, paint);
   if (random.below(3) != 0) add_zebra(b, p, p.length - 3.8, paint);
   for (int i = 0; i < static_cast<int>(p.length / 9); ++i) {
-    const Vector2d at(random.uniform(5, p.length - 8), random.uniform(-p.half_road + 0.2, p.half_road - 2.2));
-    const Vector2d size(random.uniform(0.6, 3.0), random.uniform(0.5, 2.0));
+    const Vector2d at{random.uniform(5, p.length - 8), random.uniform(-p.half_road + 0.2, p.half_road - 2.2)};
+    const Vector2d size{random.uniform(0.6, 3.0), random.uniform(0.5, 2.0)};
     const Texture look = texture(Material::kAsphalt, static_cast<float>(random.uniform(0.13, 0.32)), random);
     add_mark(b, p, at, at + size, kPatch, look);
   }
   for (int i = 0; i < 4; ++i) {
-    const Vector2d at(random.uniform(5, p.length - 6), random.uniform(-p.half_road + 0.3, p.half_road - 1.0));
+    const Vector2d at{random.uniform(5, p.length - 6), random.uniform(-p.half_road + 0.3, p.half_road - 1.0)};
     add_mark(b, p, at, at + Vector2d(0.65, 0.65), kLid, texture(Material::kTile, 0.16f, random));
   }
 }
@@ -178,9 +178,9 @@ void add_crossing(Building& b, const Area& area, const PartSeed& seed, Detail de
   Random random(seed.town, "crossing", seed.place);
   const Vector2d size = area.size();
   for (int i = 0; i < 4; ++i) {
-    const Vector2d extent = i < 2 ? Vector2d(0.65, 0.65) : Vector2d(random.uniform(0.8, 3.0), random.uniform(0.8, 3.0));
+    const Vector2d extent = i < 2 ? Vector2d(0.65, 0.65) : Vector2d{random.uniform(0.8, 3.0), random.uniform(0.8, 3.0)};
     const Vector2d low =
-        area.low + Vector2d(random.uniform(0.2, size.x() - extent.x()), random.uniform(0.2, size.y() - extent.y()));
+        area.low + Vector2d{random.uniform(0.2, size.x() - extent.x()), random.uniform(0.2, size.y() - extent.y())};
     const Texture look = i < 2 ? texture(Material::kTile, 0.16f, random)
                                : texture(Material::kAsphalt, static_cast<float>(random.uniform(0.14, 0.3)), random);
     add_flat(b, {low, low + extent}, i < 2 ? kLid : kPatch, look);

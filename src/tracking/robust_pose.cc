@@ -141,7 +141,8 @@ bool lasting_landmarks_found(const map::BundledMap& map, std::span<const Landmar
     ++counts.visible;
     counts.found += std::ranges::binary_search(found, l);
   }
-  return lasting.visible < kEnough || lasting.share() >= kAboutAsOften * new_ones.share();
+  if (std::min(lasting.visible, new_ones.visible) < kEnough) return true;
+  return lasting.share() >= kAboutAsOften * new_ones.share();
 }
 
 std::vector<std::uint8_t> agreeing_beyond_chance(const camera::Rig& rig,

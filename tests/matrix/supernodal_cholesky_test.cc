@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "base/random.h"
+#include "matrix/selected_inverse.h"
 
 namespace bslam::matrix {
 namespace {
@@ -62,7 +63,7 @@ TEST_F(SupernodalCholeskyTest, SolvesLikeADenseFactorisation) {
   SupernodalCholesky factor(pattern, sizes);
   for (int round = 0; round < 2; ++round) {  // the analysis serves for several matrices
     ASSERT_TRUE(factor.factorise(*A));
-    const Eigen::MatrixXd B = Eigen::MatrixXd::Random(A->rows(), 3);
+    const Eigen::MatrixXd B = Eigen::MatrixXd::NullaryExpr(A->rows(), 3, [&] { return random.normal(); });
     const Eigen::MatrixXd expected = dense.llt().solve(B);
     EXPECT_LT((factor.solve(B) - expected).norm(), 1e-12 * expected.norm());
     fill();
@@ -81,6 +82,38 @@ TEST_F(SupernodalCholeskyTest, FactorIsSparseAndThatOfThePermutedMatrix) {
       const auto found = product.block(factor.position(a), factor.position(b), size_a, size_b);
       EXPECT_LT((found - dense.block(A->offset(a), A->offset(b), size_a, size_b)).norm(), 1e-10) << a << " " << b;
     }
+  }
+}
+
+// Columns that are stored together have more rows than their own, but all of them are connected by elimination.
+TEST_F(SupernodalCholeskyTest, FactorServesForEntriesOfTheInverse) {
+  SupernodalCholesky factor(pattern, sizes);
+  ASSERT_TRUE(factor.factorise(*A));
+  const Eigen::MatrixXd inverse = dense.inverse();
+  const Eigen::SparseMatrix<double> found = selected_inverse(factor.factor());
+  std::vector<Eigen::Index> row_of_A(static_cast<std::size_t>(A->rows()));
+  for (int b = 0; b < kBlocks; ++b) {
+    for (int r = 0; r < sizes[static_cast<std::size_t>(b)]; ++r)
+      row_of_A[static_cast<std::size_t>(factor.position(b) + r)] = A->offset(b) + r;
+  }
+  for (int j = 0; j < found.cols(); ++j) {
+    for (Eigen::SparseMatrix<double>::InnerIterator it(found, j); it; ++it)
+      EXPECT_NEAR(it.value(),
+                  inverse(row_of_A[static_cast<std::size_t>(it.row())], row_of_A[static_cast<std::size_t>(j)]), 1e-10);
+  }
+}
+
+TEST(SupernodalCholesky, FactorisesOneBlockAndBlocksThatAreNotConnected) {
+  for (const int blocks : {1, 5}) {
+    BlockPattern pattern(blocks);
+    pattern.number();
+    const std::vector<int> sizes(static_cast<std::size_t>(blocks), 6);
+    BlockMatrix A(pattern, sizes);
+    for (int b = 0; b < blocks; ++b) A.leading<6>(pattern.index(b, b)).diagonal().setConstant(b + 2.0);
+    SupernodalCholesky factor(pattern, sizes);
+    ASSERT_TRUE(factor.factorise(A));
+    const Eigen::MatrixXd X = factor.solve(Eigen::MatrixXd::Ones(6 * blocks, 1));
+    for (int b = 0; b < blocks; ++b) EXPECT_NEAR(X(6 * b, 0), 1 / (b + 2.0), 1e-15);
   }
 }
 
