@@ -69,7 +69,7 @@ def test_images_are_not_copied(system, recording):
     system.process(recording.stamps[0], recording.images[0])
     peaks = []  # a copy would be in each of them, allocations of another thread of the interpreter are not
     tracemalloc.start()
-    for i in range(1, 4):
+    for i in range(1, min(20, len(recording.stamps))):
         tracemalloc.reset_peak()
         before, _ = tracemalloc.get_traced_memory()
         system.process(recording.stamps[i], recording.images[i])

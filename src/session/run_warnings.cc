@@ -197,15 +197,12 @@ void warn_of_disagreement(const RunRecord& record, std::size_t camera, const std
     keypoints += frame.record->final_result().cameras[camera].keypoints;
     inliers += frame.record->final_result().cameras[camera].inliers;
   }
-  if (record.calibration.verdict() == calibration::Verdict::kConsistent) {
-    warn(warnings,
-         "{}: inconsistent with the other cameras at the end of the run, although the calibration agrees with the "
-         "images before: something may cover it or move in front of it, or it was moved",
-         record.cameras[camera].name);
-    return;
-  }
-  warn(warnings, "{}: only {} of {} keypoints are inliers: check this camera's time stamps and extrinsics ({})",
-       record.cameras[camera].name, inliers, keypoints, check_command);
+  // The verdict says little of a camera whose matches did not count.
+  warn(warnings, "{}: only {} of {} keypoints are inliers: check this camera's time stamps and extrinsics ({}){}",
+       record.cameras[camera].name, inliers, keypoints, check_command,
+       record.calibration.verdict() == calibration::Verdict::kConsistent
+           ? "; if these are right, something covers it or moves in front of it, or it was moved"
+           : "");
 }
 
 std::string late_text(const RunRecord& record) {
@@ -213,7 +210,6 @@ std::string late_text(const RunRecord& record) {
   return calibration::describe_late_camera(late, record.cameras[late.camera].name, record.cameras[late.reference].name);
 }
 
-// Warns of pairs of cameras that should see the same things but do not.
 // The contradicted pair with the most matches; if there is none, one that is not contradicted, or the end.
 std::vector<calibration::CameraPair>::const_iterator most_contradicted(
     const std::vector<calibration::CameraPair>& pairs) {
@@ -221,6 +217,7 @@ std::vector<calibration::CameraPair>::const_iterator most_contradicted(
   return std::ranges::max_element(pairs, {}, weight);
 }
 
+// Warns of pairs of cameras that should see the same things but do not.
 void warn_of_pairs(const RunRecord& record, const std::string& check_command, Warnings& warnings) {
   if (const std::string foreign = foreign_images_text(record); !foreign.empty()) {
     const bool mirrored = most_contradicted(record.calibration.pairs)->mirrored();
