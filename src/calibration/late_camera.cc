@@ -86,12 +86,11 @@ bool fits_elsewhere(const camera::Rig& rig, const LateCamera& late, const std::v
 // The camera that most pairs show to be late in a part of the triples.
 std::optional<LateCamera> find_in_part(const camera::Rig& rig, const std::vector<std::vector<View>>& views,
                                        const Part& part) {
-  constexpr double kMuchOverlap = 0.2;
   std::vector<LateCamera> found;
   std::vector<int> votes(rig.size(), 0);
   for (std::size_t i = 0; i < rig.size(); ++i) {
     for (std::size_t j = i + 1; j < rig.size(); ++j) {
-      if (std::max(rig.overlap_share(i, j), rig.overlap_share(j, i)) < kMuchOverlap) continue;
+      if (std::max(rig.overlap_share(i, j), rig.overlap_share(j, i)) < kSomeOverlap) continue;
       const auto late = judge(rig, i, j, views, part);
       if (!late) continue;
       found.push_back(*late);

@@ -48,7 +48,9 @@ Result<std::vector<std::vector<image_files::ImageFile>>> collect_images(const Da
     if (const auto mask = image_decoding::read_mask(camera); !mask) return mask.error();
     const std::string source = image_files::source_of(list->images.front());
     if (const Status s = convert_time_stamps(request.time_stamps, source, list->images); !s) return s.error();
-    if (auto mixed = interleaved_warning(list->images); mixed && !list->sorted) add_once(*mixed, chosen.warnings);
+    if (!list->sorted) {
+      if (const auto mixed = interleaved_warning(list->images)) add_once(*mixed, chosen.warnings);
+    }
     if (request.masks) {
       const auto warnings = add_image_masks(*request.masks, chosen.cameras[i], camera, list->images);
       if (!warnings) return warnings.error();

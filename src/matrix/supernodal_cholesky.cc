@@ -106,13 +106,12 @@ bool belong_together(const Columns& last, const Columns& next, const std::vector
 SupernodalCholesky::SupernodalCholesky(const BlockPattern& pattern, std::span<const int> sizes)
     : positions_(pattern.positions()), size_(sizes.begin(), sizes.end()), offset_(1, 0), begin_(1, 0) {
   for (const int size : size_) offset_.push_back(offset_.back() + size);
-  order_ = minimum_degree_order(positions_, static_cast<int>(size_.size()));
-  const std::vector<int> after = postorder(factor_rows(lower_rows(positions_, inverse_of(order_))));
+  const std::vector<int> by_degree = minimum_degree_order(positions_, static_cast<int>(size_.size()));
+  const std::vector<int> after = postorder(factor_rows(lower_rows(positions_, inverse_of(by_degree))));
   std::vector<int> order;
-  for (const int k : after) order.push_back(order_[at(k)]);
-  order_ = std::move(order);
-  place_ = inverse_of(order_);
-  for (const int block_row : order_) begin_.push_back(begin_.back() + size_[at(block_row)]);
+  for (const int k : after) order.push_back(by_degree[at(k)]);
+  place_ = inverse_of(order);
+  for (const int block_row : order) begin_.push_back(begin_.back() + size_[at(block_row)]);
   make_supernodes(factor_rows(lower_rows(positions_, place_)));
   row_in_panel_.assign(at(begin_.back()), 0);
 }

@@ -58,7 +58,7 @@ class SupernodalCholesky {
 
   std::vector<BlockPattern::Position> positions_;  // of the blocks of A
   std::vector<int> size_, offset_;                 // per block row of A; offset of its rows
-  std::vector<int> place_, order_;                 // block row of P A P^T per block row of A, and the inverse
+  std::vector<int> place_;                         // block row of P A P^T per block row of A
   std::vector<int> begin_;                         // first row per block row of P A P^T and one more
   std::vector<Supernode> supernodes_;
   std::vector<int> supernode_of_;  // per row of L

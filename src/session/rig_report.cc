@@ -14,6 +14,7 @@
 #include "report/rig_plot.h"
 #include "rig_formats/rig_file.h"
 #include "session/image_test.h"
+#include "session/late_camera_json.h"
 
 namespace bslam::session {
 namespace {
@@ -118,17 +119,6 @@ struct ImageEvidence {
   std::optional<calibration::LateCamera> late;
 };
 
-Json late_json(const calibration::LateCamera& late) {
-  return {{"camera", late.camera},
-          {"reference", late.reference},
-          {"early", late.early},
-          {"part", late.part},
-          {"matches", late.matches},
-          {"fit", late.agreeing},
-          {"matches_one_frame_apart", late.matches_apart},
-          {"fit_one_frame_apart", late.agreeing_apart}};
-}
-
 std::string as_json(const Calibration& calibration, const std::optional<ImageEvidence>& evidence) {
   const rig_formats::RigFile& file = calibration.file;
   const camera::Rig& rig = file.rig;
@@ -147,7 +137,11 @@ std::string as_json(const Calibration& calibration, const std::optional<ImageEvi
                {"notes", file.notes},
                {"warnings", warnings_of(rig)}};
   if (evidence) json["images"] = evidence_json(evidence->pairs);
-  if (evidence) json["late_camera"] = evidence->late ? late_json(*evidence->late) : Json();
+  if (evidence) {
+    const auto& late = evidence->late;
+    json["late_camera"] =
+        late ? late_camera_json({{"camera", late->camera}, {"reference", late->reference}}, *late) : Json();
+  }
   return json.dump(1) + "\n";
 }
 

@@ -5,6 +5,8 @@
 #include <limits>
 #include <numeric>
 
+#include "session/late_camera_json.h"
+
 namespace bslam::session {
 
 namespace {
@@ -108,14 +110,8 @@ ordered_json calibrated_camera_json(const std::string& name, const calibration::
 ordered_json late_json(const RunRecord& record) {
   const auto& late = record.calibration.late;
   if (!late) return nullptr;
-  return {{"name", record.cameras[late->camera].name},
-          {"reference", record.cameras[late->reference].name},
-          {"early", late->early},
-          {"part", late->part},
-          {"matches", late->matches},
-          {"fit", late->agreeing},
-          {"matches_one_frame_apart", late->matches_apart},
-          {"fit_one_frame_apart", late->agreeing_apart}};
+  return late_camera_json(
+      {{"name", record.cameras[late->camera].name}, {"reference", record.cameras[late->reference].name}}, *late);
 }
 
 ordered_json calibration_json(const RunRecord& record) {

@@ -48,9 +48,14 @@ std::string marker(const fs::path& folder, const char* name) {
 
 std::string complete_mark(const std::string& digest) { return fmt::format("{} lists {}", digest, kListsVersion); }
 
-enum class FolderState { kFresh, kSameIncomplete, kSameComplete };
+bool is_complete(const fs::path& folder, const std::string& digest) {
+  return marker(folder, kComplete) == complete_mark(digest);
+}
 
-// Examines and prepares the folder. With `overwrite`, an earlier simulated recording is removed.
+enum class FolderState { kFresh, kSameIncomplete };
+
+// Examines and prepares the folder, whose recording is not complete. With `overwrite`, an earlier simulated recording
+// is removed.
 Result<FolderState> prepare_folder(const SimulationRequest& request, const std::string& digest) {
   const fs::path& folder = request.folder;
   std::error_code code;
@@ -59,7 +64,6 @@ Result<FolderState> prepare_folder(const SimulationRequest& request, const std::
   }
   if (const Status s = make_folder(folder); !s) return s.error();
   const std::string complete = marker(folder, kComplete), partial = marker(folder, kPartial);
-  if (complete == complete_mark(digest)) return FolderState::kSameComplete;
   if (complete.starts_with(digest)) return FolderState::kSameIncomplete;  // the lists have another version
   const bool is_simulation = !complete.empty() || !partial.empty();
   if (partial == digest && complete.empty()) return FolderState::kSameIncomplete;
@@ -272,14 +276,14 @@ std::string simulation_digest(const SimulationRequest& r) {
 Result<SimulationOutcome> write_simulation(const SimulationRequest& request, ThreadPool& pool,
                                            const SimulationProgress& progress, std::stop_token stop) {
   if (const Status s = check_request(request); !s) return s.error();
+  const std::string digest = simulation_digest(request);
+  if (is_complete(request.folder, digest)) return SimulationOutcome::kWasComplete;
   TourOptions tour = request.tour;
   tour.duration_s = request.recording.duration_s;
   const Scenery scenery = make_scenery(request.kind, request.seed, tour, request.world);
   if (const Status s = check_scenery(request, scenery); !s) return s.error();
-  const std::string digest = simulation_digest(request);
   const auto state = prepare_folder(request, digest);
   if (!state) return state.error();
-  if (*state == FolderState::kSameComplete) return SimulationOutcome::kWasComplete;
   for (std::size_t c = 0; c < request.rig.size(); ++c) {
     if (const Status s = make_folder(camera_folder(request.folder, c) / "data"); !s) return s.error();
   }
