@@ -6,8 +6,10 @@
 namespace bslam::calibration {
 namespace {
 
-constexpr std::size_t kSegment = 10;  // consecutive keyframes chosen together, so that they share landmarks
-constexpr int kMinShared = 15;        // minimum number of shared landmarks for one keyframe to constrain another
+// Number of consecutive keyframes of a segment. Those of a short one share landmarks. A long one has turns and loops,
+// which tell the focal length: a part of a straight path hardly does.
+constexpr std::size_t kShortSegment = 10, kLongSegment = 100;
+constexpr int kMinShared = 15;  // minimum number of shared landmarks for one keyframe to constrain another
 
 // Whether the velocity of a keyframe is known. The images of others show a rig whose late cameras and rolling shutters
 // are in the wrong place.
@@ -25,11 +27,12 @@ std::vector<KeyframeId> usable_keyframes(const map::BundledMap& map, bool timing
 // Returns all of these keyframes, or evenly spaced segments of consecutive ones if there are more than `limit`.
 std::vector<KeyframeId> choose_keyframes(const std::vector<KeyframeId>& all, std::size_t limit) {
   if (all.size() <= limit) return all;
-  const std::size_t segments = std::max<std::size_t>(1, limit / kSegment);
+  const std::size_t length = std::clamp(limit / 10, kShortSegment, kLongSegment);
+  const std::size_t segments = std::max<std::size_t>(1, limit / length);
   std::vector<KeyframeId> out;
   for (std::size_t s = 0; s < segments; ++s) {
-    const std::size_t first = segments == 1 ? 0 : s * (all.size() - kSegment) / (segments - 1);
-    for (std::size_t k = first; k < std::min(first + kSegment, all.size()); ++k) out.push_back(all[k]);
+    const std::size_t first = segments == 1 ? 0 : s * (all.size() - length) / (segments - 1);
+    for (std::size_t k = first; k < std::min(first + length, all.size()); ++k) out.push_back(all[k]);
   }
   return out;
 }
@@ -47,7 +50,7 @@ Candidate look_up(const map::BundledMap& map, LandmarkId landmark, const std::ve
   for (const map::Observation& o : map.observations(landmark)) {
     const int at = position[o.keyframe.index()];
     if (at < 0) continue;
-    if (out.keyframes++ == 0) out.segment = static_cast<std::size_t>(at) / kSegment;
+    if (out.keyframes++ == 0) out.segment = static_cast<std::size_t>(at) / kShortSegment;
     for (const frame::KeypointRef r : map.keyframe(o.keyframe).frame->bundled.keypoints(o.feature))
       out.cameras[r.camera.index()] = 1;
   }
@@ -59,7 +62,7 @@ Candidate look_up(const map::BundledMap& map, LandmarkId landmark, const std::ve
 std::vector<LandmarkId> choose_landmarks(const map::BundledMap& map, const std::vector<KeyframeId>& keyframes,
                                          std::size_t limit) {
   const std::vector<int> position = adjustment::index_by_keyframe(map, keyframes);
-  const std::size_t segments = (keyframes.size() + kSegment - 1) / kSegment, cameras = map.rig().size();
+  const std::size_t segments = (keyframes.size() + kShortSegment - 1) / kShortSegment, cameras = map.rig().size();
   // negated number of keyframes, so that sorting puts the largest first
   std::vector<std::vector<std::pair<int, LandmarkId>>> queues(segments * cameras);
   for (const LandmarkId l : map.landmark_ids()) {
@@ -88,28 +91,42 @@ std::vector<LandmarkId> choose_landmarks(const map::BundledMap& map, const std::
   return out;
 }
 
+// The chosen keyframes that observe each landmark, by position, and the landmarks that each of them observes.
+struct Sightings {
+  std::vector<std::vector<std::size_t>> keyframes_of_landmark, landmarks_of_keyframe;
+};
+
+Sightings sightings(const map::BundledMap& map, const std::vector<KeyframeId>& keyframes,
+                    const std::vector<LandmarkId>& landmarks) {
+  const std::vector<int> position = adjustment::index_by_keyframe(map, keyframes);
+  Sightings out{std::vector<std::vector<std::size_t>>(landmarks.size()),
+                std::vector<std::vector<std::size_t>>(keyframes.size())};
+  for (std::size_t l = 0; l < landmarks.size(); ++l) {
+    for (const map::Observation& o : map.observations(landmarks[l])) {
+      if (position[o.keyframe.index()] < 0) continue;
+      const auto at = static_cast<std::size_t>(position[o.keyframe.index()]);
+      out.keyframes_of_landmark[l].push_back(at);
+      out.landmarks_of_keyframe[at].push_back(l);
+    }
+  }
+  return out;
+}
+
 // Assigns each keyframe to a group of keyframes connected, directly or indirectly, by shared landmarks. Returns, per
 // keyframe, the index of the first keyframe of its group.
 std::vector<std::size_t> groups(const map::BundledMap& map, const std::vector<KeyframeId>& keyframes,
                                 const std::vector<LandmarkId>& landmarks) {
-  const std::vector<int> position = adjustment::index_by_keyframe(map, keyframes);
-  const std::size_t n = keyframes.size();
-  std::vector<int> shared(n * n, 0);
-  std::vector<std::size_t> seen;
-  for (const LandmarkId l : landmarks) {
-    seen.clear();
-    for (const map::Observation& o : map.observations(l)) {
-      if (position[o.keyframe.index()] >= 0) seen.push_back(static_cast<std::size_t>(position[o.keyframe.index()]));
-    }
-    for (const std::size_t a : seen) {
-      for (const std::size_t b : seen) ++shared[a * n + b];
-    }
-  }
-  std::vector<std::size_t> group(n);
+  const Sightings seen = sightings(map, keyframes, landmarks);
+  std::vector<std::size_t> group(keyframes.size());
   std::iota(group.begin(), group.end(), 0u);
-  for (std::size_t a = 0; a < n; ++a) {
-    for (std::size_t b = a + 1; b < n; ++b) {
-      if (shared[a * n + b] < kMinShared || group[a] == group[b]) continue;
+  std::vector<int> shared(keyframes.size());
+  for (std::size_t a = 0; a < keyframes.size(); ++a) {
+    std::fill(shared.begin(), shared.end(), 0);
+    for (const std::size_t l : seen.landmarks_of_keyframe[a]) {
+      for (const std::size_t b : seen.keyframes_of_landmark[l]) ++shared[b];
+    }
+    for (std::size_t b = a + 1; b < keyframes.size(); ++b) {
+      if (shared[b] < kMinShared || group[a] == group[b]) continue;
       const std::size_t kept = std::min(group[a], group[b]), gone = std::max(group[a], group[b]);
       std::replace(group.begin(), group.end(), gone, kept);
     }

@@ -27,9 +27,9 @@ enum class Refine {
 
 struct CalibrationOptions {
   Refine refine = Refine::kAuto;
-  bool check = true;     // at the end of a run, estimate the calibration and report differences
-  int keyframes = 120;   // maximum number, in segments of consecutive keyframes distributed over the map
-  int landmarks = 3000;  // maximum number, distributed over segments and cameras
+  bool check = true;      // at the end of a run, estimate the calibration and report differences
+  int keyframes = 2000;   // maximum number, in segments of consecutive keyframes distributed over the map
+  int landmarks = 20000;  // maximum number, distributed over segments and cameras
   // Standard deviations of the given calibration: the prior of the estimate. Extrinsics: per axis. Focal lengths
   // and their ratio: relative. Principal points: per axis, of the image width. Distortion: of the model table
   // (camera/model_table.h).
@@ -63,9 +63,9 @@ struct CalibrationOptions {
     visitor("check", self.check, Range{}, "",
             "at the end of a run, estimate the calibration and report cameras that differ from it",
             OptionNote{.common = true, .formerly = "extrinsics.check"});
-    visitor("keyframes", self.keyframes, Range{10, 500}, "", "maximum number of keyframes used",
+    visitor("keyframes", self.keyframes, Range{10, 1e5}, "", "maximum number of keyframes used",
             OptionNote{.formerly = "extrinsics.keyframes"});
-    visitor("landmarks", self.landmarks, Range{100, 1e5}, "", "maximum number of landmarks used",
+    visitor("landmarks", self.landmarks, Range{100, 1e6}, "", "maximum number of landmarks used",
             OptionNote{.formerly = "extrinsics.landmarks"});
     visit_deviations(self, visitor);
     visitor("scale_tolerance_percent", self.scale_tolerance_percent, Range{0, 100}, "%",
