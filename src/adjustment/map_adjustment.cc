@@ -72,13 +72,15 @@ PoseUncertainties adjust_inliers(const map::BundledMap& map, const Selection& se
   const std::vector<double> chi2 = solver::squared_errors(flat.problem);
   const auto skip = solver::beyond(chi2, options.outlier_chi2);
   const auto variances = landmark_variances(flat.problem, chi2, skip);
-  const solver::BundleOptions solve{.iterations = options.final_iterations,
-                                    .relative_decrease = options.relative_decrease,
-                                    .robust = false,
-                                    .marginals = poses_with_uncertainty(selection, flat),
-                                    .rig_deviation = map.rig_deviation(),
-                                    .rig_prior = selection.rig_prior,
-                                    .correlated_observations = options.correlated_observations};
+  solver::BundleOptions solve{.iterations = options.final_iterations,
+                              .relative_decrease = options.relative_decrease,
+                              .robust = false,
+                              .marginals = poses_with_uncertainty(selection, flat),
+                              .rig_deviation = map.rig_deviation(),
+                              .rig_prior = selection.rig_prior,
+                              .correlated_observations = options.correlated_observations};
+  if (solve.rig_deviation && !selection.whole_map)  // the whole map is fixed by the roots, which have no effects
+    solve.fixed_effects = fixed_effects(map, flat, solve.rig_deviation->cols());
   const auto summary = adjust_with_variances(flat.problem, variances, solve, skip, std::move(stop));
   PoseUncertainties out;
   if (!solve.rig_deviation && !solve.rig_prior) out = without_calibration(map);

@@ -17,6 +17,17 @@ int anchor_pose(const map::BundledMap& map, const BundleProblem& flat, std::span
   return anchor;
 }
 
+std::vector<int> observations_of_poses(const BundleProblem& flat) {
+  std::vector<int> out(flat.keyframes.size(), 0);
+  for (const auto& o : flat.problem.observations) ++out[static_cast<std::size_t>(o.pose)];
+  return out;
+}
+
+geometry::SE3 relative_pose(const BundleProblem& flat, std::size_t pose, int anchor) {
+  const auto& T_rig_world = flat.problem.T_rig_world;
+  return T_rig_world[pose] * T_rig_world[static_cast<std::size_t>(anchor)].inverse();
+}
+
 }  // namespace
 
 std::vector<int> poses_with_uncertainty(const Selection& selection, const BundleProblem& flat) {
@@ -28,22 +39,40 @@ std::vector<int> poses_with_uncertainty(const Selection& selection, const Bundle
   return poses;
 }
 
+std::vector<geometry::PoseUncertainty::Effect> fixed_effects(const map::BundledMap& map, const BundleProblem& flat,
+                                                             Eigen::Index columns) {
+  using Effect = geometry::PoseUncertainty::Effect;
+  const std::vector<int> observations = observations_of_poses(flat);
+  const auto effect = [&](std::size_t pose) {
+    const Effect& own = map.keyframe(flat.keyframes[pose]).uncertainty.calibration;
+    return own.cols() == columns ? own : Effect(Effect::Zero(6, columns));
+  };
+  std::vector<Effect> out(flat.keyframes.size(), Effect(6, 0));
+  bool any = false;
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    if (flat.problem.pose_free[i]) continue;
+    out[i] = Effect::Zero(6, columns);
+    const int anchor = anchor_pose(map, flat, observations, map.root_of(flat.keyframes[i]));
+    if (anchor == static_cast<int>(i)) continue;
+    out[i] = effect(i) - relative_pose(flat, i, anchor).adjoint() * effect(static_cast<std::size_t>(anchor));
+    any |= !out[i].isZero(0);
+  }
+  return any ? out : std::vector<Effect>{};
+}
+
 PoseUncertainties pose_uncertainties(const map::BundledMap& map, const BundleProblem& flat, std::span<const int> poses,
                                      std::span<const std::optional<geometry::PoseUncertainty>> marginals,
                                      double correlated_observations) {
   // The truncation at the bound of outliers biases both the noise and the information by this factor.
   constexpr double kTruncation = solver::kFractionLeft / solver::kVarianceLeft;
   const double factor = correlated_observations * kTruncation * kTruncation;
-  std::vector<int> observations(flat.keyframes.size(), 0);
-  for (const auto& o : flat.problem.observations) ++observations[static_cast<std::size_t>(o.pose)];
+  const std::vector<int> observations = observations_of_poses(flat);
   PoseUncertainties out;
   for (std::size_t i = 0; i < marginals.size(); ++i) {
     const KeyframeId k = flat.keyframes[static_cast<std::size_t>(poses[i])];
     const int anchor = anchor_pose(map, flat, observations, map.root_of(k));
     if (!marginals[i] || anchor < 0) continue;
-    const auto& T_rig_world = flat.problem.T_rig_world;
-    const geometry::SE3 T_k_anchor =
-        T_rig_world[static_cast<std::size_t>(poses[i])] * T_rig_world[static_cast<std::size_t>(anchor)].inverse();
+    const geometry::SE3 T_k_anchor = relative_pose(flat, static_cast<std::size_t>(poses[i]), anchor);
     const geometry::PoseUncertainty of_adjustment{factor * marginals[i]->noise, marginals[i]->calibration};
     geometry::PoseUncertainty of_anchor = map.keyframe(flat.keyframes[static_cast<std::size_t>(anchor)]).uncertainty;
     if (of_adjustment.calibration.cols() == 0) of_anchor = geometry::without_calibration(of_anchor);

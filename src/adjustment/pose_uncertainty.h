@@ -10,7 +10,8 @@
 // a, represents all:
 //     C_k = correlated_observations (0.95 / 0.80)^2 M + Ad(T_ka) C_a Ad(T_ka)^T        (docs/math.md, section 5)
 //     F_k = F + Ad(T_ka) F_a
-// where F is the effect of the calibration's error on the pose relative to the fixed keyframes. The root has F = 0,
+// where F is the effect of the calibration's error on the pose relative to the anchor, given the effects on the other
+// fixed keyframes relative to it (fixed_effects). The root has F = 0,
 // and C = 0 unless it was moved away from the origin (calibration::move_submap). Not included are errors of the
 // velocities of the rig.
 #pragma once
@@ -28,6 +29,12 @@ using PoseUncertainties = std::vector<std::pair<KeyframeId, geometry::PoseUncert
 
 // Positions of the selection's keyframes `with_uncertainty` in the poses of the problem.
 std::vector<int> poses_with_uncertainty(const Selection& selection, const BundleProblem& flat);
+
+// solver::BundleOptions::fixed_effects, relative to the anchor: F_f - Ad(T_fa) F_a of each fixed keyframe f. An error
+// of the scale, for example, changes their distances, although they drift together. Empty if there is at most one in
+// each submap, or none has an effect.
+std::vector<geometry::PoseUncertainty::Effect> fixed_effects(const map::BundledMap& map, const BundleProblem& flat,
+                                                             Eigen::Index columns);
 
 // Returns the uncertainties of T_rig_world, in radians and map units, of the keyframes at these poses. `marginals`: M
 // and F of each, as in solver::BundleSummary; keyframes without one are left out. `map` has the uncertainties of the

@@ -56,6 +56,18 @@ std::optional<Eigen::MatrixXd> deviation_after(const BundleOptions& options, con
   return L;
 }
 
+// The effect of the known deviation of the rig if the fixed poses depend on it.
+std::vector<std::optional<geometry::PoseUncertainty::Effect>> effects_beside_fixed_poses(
+    ReprojectionProblem problem, const BundleOptions& options, Kernel kernel, const BundleState& state,
+    const std::vector<double>& chi2, std::span<const std::uint8_t> skip) {
+  problem.pose_free.assign(problem.T_rig_world.size(), 1);
+  const BundleStructure all = make_structure(problem, chi2, skip);
+  const RigBlocks calibration = calibration_blocks(state.rig);
+  BundleEquations equations(problem, all, calibration, kernel, options.dense_poses, state);
+  equations.linearise();
+  return equations.rig_effects(options.marginals, *options.rig_deviation, options.fixed_effects);
+}
+
 // The effect of the deviation of the rig on the poses. It is a ratio of two quantities that grow in the same way with
 // the number of points, so that some of them suffice if the deviation is known.
 std::vector<std::optional<geometry::PoseUncertainty::Effect>> effects_of_rig(
@@ -63,6 +75,8 @@ std::vector<std::optional<geometry::PoseUncertainty::Effect>> effects_of_rig(
     const BundleState& state, const std::vector<double>& chi2, std::span<const std::uint8_t> skip) {
   const std::vector<std::optional<geometry::PoseUncertainty::Effect>> unknown(options.marginals.size());
   const bool known = options.rig_deviation != nullptr;
+  if (known && !options.fixed_effects.empty())
+    return effects_beside_fixed_poses(problem, options, kernel, state, chi2, thinned_out(problem, structure, skip));
   const BundleStructure some = known ? make_structure(problem, chi2, thinned_out(problem, structure, skip)) : structure;
   const RigBlocks calibration = calibration_blocks(state.rig);
   BundleEquations equations(problem, some, calibration, kernel, options.dense_poses, state);

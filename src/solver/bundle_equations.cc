@@ -1,5 +1,6 @@
 #include "solver/bundle_equations.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -272,10 +273,10 @@ std::vector<std::optional<geometry::Matrix6d>> BundleEquations::pose_covariances
   return out;
 }
 
-std::vector<std::optional<geometry::PoseUncertainty::Effect>> BundleEquations::rig_effects(
-    std::span<const int> poses, const Eigen::MatrixXd& rig_deviation) const {
+// The rows of each of these poses; nullopt if it is not a variable, or they are not finite.
+std::vector<std::optional<geometry::PoseUncertainty::Effect>> BundleEquations::rows_of(
+    std::span<const int> poses, const Eigen::MatrixXd& effect) const {
   std::vector<std::optional<geometry::PoseUncertainty::Effect>> out(poses.size());
-  const Eigen::MatrixXd effect = system_.rig_sensitivity() * rig_deviation;
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const int slot = slot_of(poses[i]);
     if (slot < 0) continue;
@@ -283,6 +284,40 @@ std::vector<std::optional<geometry::PoseUncertainty::Effect>> BundleEquations::r
     if (of_pose.allFinite()) out[i] = of_pose;
   }
   return out;
+}
+
+std::vector<std::optional<geometry::PoseUncertainty::Effect>> BundleEquations::rig_effects(
+    std::span<const int> poses, const Eigen::MatrixXd& rig_deviation) const {
+  return rows_of(poses, system_.rig_sensitivity() * rig_deviation);
+}
+
+// With the poses x whose effects are sought and those f whose effects F_f are given, S_xx F_x = -(B_x L + S_xf F_f).
+std::vector<std::optional<geometry::PoseUncertainty::Effect>> BundleEquations::rig_effects(
+    std::span<const int> poses, const Eigen::MatrixXd& rig_deviation,
+    std::span<const geometry::PoseUncertainty::Effect> given) {
+  reduce(kInformationDamping);
+  Eigen::MatrixXd S = Eigen::MatrixXd::Zero(system_.frames().rows(), system_.frames().rows());
+  system_.frames().copy_to(S);
+  S.triangularView<Eigen::StrictlyUpper>() = S.transpose();
+  Eigen::MatrixXd effect = Eigen::MatrixXd::Zero(S.rows(), rig_deviation.cols());
+  std::vector<int> sought;  // rows
+  for (std::size_t slot = 0; slot < structure_.pose_of_slot.size(); ++slot) {
+    const geometry::PoseUncertainty::Effect& known = given[static_cast<std::size_t>(structure_.pose_of_slot[slot])];
+    const int at = system_.frames().offset(static_cast<int>(slot));
+    if (known.cols() > 0) {
+      effect.middleRows<6>(at) = known;
+    } else {
+      for (int k = 0; k < 6; ++k) sought.push_back(at + k);
+    }
+  }
+  const Eigen::MatrixXd rhs = (-(system_.border() * rig_deviation + S * effect)).eval()(sought, Eigen::all);
+  const Eigen::MatrixXd of_sought = S(sought, sought);
+  const Eigen::LLT<Eigen::MatrixXd> factor(of_sought);
+  if (factor.info() != Eigen::Success)
+    return std::vector<std::optional<geometry::PoseUncertainty::Effect>>(poses.size());
+  const Eigen::MatrixXd found = factor.solve(rhs);
+  effect(sought, Eigen::all) = found;
+  return rows_of(poses, effect);
 }
 
 // V delta_p = b - sum of W^T delta over the point's free poses and the rig.

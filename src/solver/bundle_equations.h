@@ -61,6 +61,11 @@ class BundleEquations {
   std::vector<std::optional<geometry::Matrix6d>> pose_covariances(std::span<const int> poses);
   std::vector<std::optional<geometry::PoseUncertainty::Effect>> rig_effects(std::span<const int> poses,
                                                                             const Eigen::MatrixXd& rig_deviation) const;
+  // The same for equations in which all poses are variables, some of which have given effects: `given` holds one for
+  // each pose of the problem, without columns if it is not known. Reduces the equations of the last linearise().
+  std::vector<std::optional<geometry::PoseUncertainty::Effect>> rig_effects(
+      std::span<const int> poses, const Eigen::MatrixXd& rig_deviation,
+      std::span<const geometry::PoseUncertainty::Effect> given);
 
   struct PoseBlock {
     Matrix6d H;  // lower triangle
@@ -90,6 +95,8 @@ class BundleEquations {
   };
 
   void set_poses(const BundleState& state);
+  std::vector<std::optional<geometry::PoseUncertainty::Effect>> rows_of(std::span<const int> poses,
+                                                                        const Eigen::MatrixXd& effect) const;
   int slot_of(int pose) const;  // -1 if the pose is not a variable
   const Rigid& cam_from_rig(int pose, int camera) const {
     return cam_from_rig_[static_cast<std::size_t>(pose) * cameras_ + static_cast<std::size_t>(camera)];

@@ -225,7 +225,16 @@ TEST(BundleAdjuster, EffectOfTheCalibrationIsTheChangeOfTheAdjustedPoses) {
   error.segment<3>(6) << 1e-5, -2e-5, 1e-5;
   error.segment<3>(3) << 1e-5, 1e-5, -1e-5;
   error(12) = 0.01;  // of fx of camera 0
-  const auto adjusted_with = [&](double sign) {
+  // of each pose by the same error: fixed poses may depend on the calibration, too
+  std::vector<geometry::PoseUncertainty::Effect> of_fixed(scene->problem.T_rig_world.size(),
+                                                          geometry::PoseUncertainty::Effect(6, 0));
+  std::size_t fixed = 0;
+  for (std::size_t i = 0; i < of_fixed.size(); ++i) {
+    if (scene->problem.pose_free[i] != 0) continue;
+    of_fixed[i] = 1e-5 * static_cast<double>(fixed++) * geometry::Vector6d(1, -2, 1, 3, 2, -2);
+  }
+  ASSERT_GE(fixed, 2u);
+  const auto adjusted_with = [&](double sign, bool fixed_move) {
     RigValues values = rig;
     for (std::size_t c : {1, 2})
       values.T_cam_rig[c] =
@@ -236,24 +245,28 @@ TEST(BundleAdjuster, EffectOfTheCalibrationIsTheChangeOfTheAdjustedPoses) {
     const Rig changed = values.applied_to(*scene->problem.rig);
     ReprojectionProblem problem = scene->problem;
     problem.rig = &changed;
+    for (std::size_t i = 0; fixed_move && i < of_fixed.size(); ++i) {
+      if (of_fixed[i].cols() > 0) problem.T_rig_world[i] = problem.T_rig_world[i].perturbed(sign * of_fixed[i]);
+    }
     EXPECT_TRUE(adjust(problem, to_the_end(false)).usable());
     return problem.T_rig_world;
   };
-  const std::vector<SE3> plus = adjusted_with(1), minus = adjusted_with(-1);
-  for (const int dense_poses : {150, 0}) {
+  for (const auto& [dense_poses, fixed_move] : {std::pair{150, false}, {0, false}, {150, true}, {0, true}}) {
+    const std::vector<SE3> plus = adjusted_with(1, fixed_move), minus = adjusted_with(-1, fixed_move);
     ReprojectionProblem problem = scene->problem;
     BundleOptions options = to_the_end(false);
     options.dense_poses = dense_poses;
     options.marginals = {2, 3, 4};
     options.rig_deviation = std::make_shared<const Eigen::MatrixXd>(error);
+    if (fixed_move) options.fixed_effects = of_fixed;
     const BundleSummary summary = adjust(problem, options);
-    for (std::size_t i = 0; i < options.marginals.size(); ++i) {
-      const auto pose = static_cast<std::size_t>(options.marginals[i]);
+    for (std::size_t k = 0; k < options.marginals.size(); ++k) {
+      const auto pose = static_cast<std::size_t>(options.marginals[k]);
       ASSERT_TRUE(problem.pose_free[pose]);
-      ASSERT_TRUE(summary.uncertainties[i]);
+      ASSERT_TRUE(summary.uncertainties[k]);
       const geometry::Vector6d change = 0.5 * (plus[pose] * minus[pose].inverse()).log();
       EXPECT_GT(change.norm(), 1e-6);
-      EXPECT_LT((summary.uncertainties[i]->calibration - change).norm(), 1e-3 * change.norm());
+      EXPECT_LT((summary.uncertainties[k]->calibration - change).norm(), 1e-3 * change.norm());
     }
   }
 }
