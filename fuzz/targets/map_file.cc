@@ -2,13 +2,12 @@
 // reached.
 #include "storage/map_file.h"
 
-#include <libdeflate.h>
-
 #include <algorithm>
 #include <cstring>
 #include <memory>
 
 #include "base/random.h"
+#include "storage/map_checksum.h"
 #include "target.h"
 
 namespace bslam::fuzz {
@@ -25,23 +24,26 @@ void set(std::string& bytes, std::size_t at, T value) {
 void repair(std::string& bytes) {
   set(bytes, kTotal, std::uint64_t{bytes.size()});
   std::size_t at = kHeader;
+  ThreadPool pool(1);
   for (std::size_t i = 0; i < kSections; ++i) {
     std::uint64_t size = 0;
     std::memcpy(&size, bytes.data() + kTable + i * kEntry + 8, sizeof(size));
     const std::uint64_t rest = bytes.size() - at;
     size = i + 1 == kSections ? rest : std::min(rest, size);
-    set(bytes, kTable + i * kEntry + 4, libdeflate_crc32(0, bytes.data() + at, size));
+    set(bytes, kTable + i * kEntry + 4, storage::section_checksum(std::string_view(bytes).substr(at, size), pool));
     set(bytes, kTable + i * kEntry + 8, size);
     at += size;
   }
-  set(bytes, kHeader - 4, libdeflate_crc32(0, bytes.data(), kHeader - 4));
+  set(bytes, kHeader - 4, storage::crc32_of(std::string_view(bytes).substr(0, kHeader - 4)));
 }
 
 void check(std::string_view bytes) {
   const auto saved = storage::map_from_bytes(bytes, "fuzz");
   if (!saved) return require(!saved.error().message().empty(), "an error must have a message");
   const std::string again = storage::map_to_bytes(saved->map, saved->info);
-  require(again.size() <= bytes.size(), "a map must not become larger when written again");
+  constexpr std::size_t kVersion = 12;  // files of earlier versions have no gaps between arrays
+  require(bytes[kVersion] != again[kVersion] || again.size() <= bytes.size(),
+          "a map must not become larger when written again");
   const auto twice = storage::map_from_bytes(again, "fuzz");
   require(twice.ok() && storage::map_to_bytes(twice->map, twice->info) == again,
           "a written map must be read back equal");
@@ -53,6 +55,7 @@ std::shared_ptr<const frame::BundledFrame> small_frame(Random& random, std::size
   for (frame::CameraFrame& c : frame->cameras) {
     c.state = image::ImageState::kPresent;
     feature::Detections detections;
+    std::vector<WordId> words;
     for (std::size_t k = 0; k < keypoints; ++k) {
       detections.pixel.emplace_back(static_cast<float>(random.uniform(0, 639)),
                                     static_cast<float>(random.uniform(0, 479)));
@@ -62,9 +65,10 @@ std::shared_ptr<const frame::BundledFrame> small_frame(Random& random, std::size
       detections.bearing.push_back(Eigen::Vector3d::UnitZ());
       detections.descriptor.push_back({random.next(), random.next(), random.next(), random.next()});
       detections.patch.emplace_back();
-      c.words.emplace_back(static_cast<std::int32_t>(random.below(100)));
+      words.emplace_back(static_cast<std::int32_t>(random.below(100)));
     }
     c.keypoints = std::move(detections);
+    c.words = std::move(words);
   }
   std::vector<std::vector<frame::KeypointRef>> groups;
   std::vector<std::optional<frame::BundledPoint>> points;

@@ -22,10 +22,14 @@ class SharedArray {
   SharedArray(std::vector<T>&& values) {  // NOLINT(google-explicit-constructor)
     if (values.empty()) return;
     values.shrink_to_fit();  // some arrays live as long as the map
-    values_ = std::make_shared<const std::vector<T>>(std::move(values));
-    data_ = values_->data();
-    size_ = values_->size();
+    auto owned = std::make_shared<const std::vector<T>>(std::move(values));
+    data_ = owned->data();
+    size_ = owned->size();
+    owner_ = std::move(owned);
   }
+  // Elements that lie in memory of another owner, such as a mapped file, which lives as long as any array in it.
+  SharedArray(std::shared_ptr<const void> owner, const T* data, std::size_t size)
+      : owner_(std::move(owner)), data_(data), size_(size), borrowed_(true) {}
 
   std::size_t size() const { return size_; }
   bool empty() const { return size_ == 0; }
@@ -35,10 +39,10 @@ class SharedArray {
   const T& back() const { return data_[size_ - 1]; }
   const T* begin() const { return data_; }
   const T* end() const { return data_ + size_; }
-  // The memory of the elements, unless it was counted before.
+  // The memory of the elements, unless it was counted before or is that of another owner.
   std::size_t memory_bytes(MemoryCount& count) const {
-    if (!values_) return 0;
-    return count.once(data_, sizeof(*values_) + MemoryCount::kShared + values_->capacity() * sizeof(T));
+    if (!owner_ || borrowed_) return 0;
+    return count.once(data_, sizeof(std::vector<T>) + MemoryCount::kShared + size_ * sizeof(T));
   }
   std::vector<T> copy() const { return {begin(), end()}; }
   friend bool operator==(const SharedArray& a, const SharedArray& b) {
@@ -46,9 +50,10 @@ class SharedArray {
   }
 
  private:
-  std::shared_ptr<const std::vector<T>> values_;
-  const T* data_ = nullptr;  // data of *values_
+  std::shared_ptr<const void> owner_;  // keeps the elements alive
+  const T* data_ = nullptr;
   std::size_t size_ = 0;
+  bool borrowed_ = false;  // the owner has not been made for these elements
 };
 
 }  // namespace bslam

@@ -7,16 +7,11 @@
 #include <vector>
 
 #include "base/shared_array.h"
+#include "feature/patches.h"
 
 namespace bslam::feature {
 
 using Descriptor = std::array<std::uint64_t, 4>;  // 256 binary tests
-
-// Upright window of the level on which a keypoint was detected, centred on its sub-pixel position; it is used for
-// sub-pixel alignment after the image was released. Row-major, kPatchSize x kPatchSize grey values at offsets
-// -kPatchSize/2 + 0.5 ... in pixels of the level, so that the keypoint lies between the four middle samples.
-constexpr int kPatchSize = 10;  // 8 x 8 plus a border of one for gradients
-using Patch = std::array<std::uint8_t, kPatchSize * kPatchSize>;
 
 // The keypoints that an extractor detects in one image.
 struct Detections {
@@ -68,8 +63,9 @@ struct Keypoints {
   SharedArray<Eigen::Vector3d> bearing;
   SharedArray<float> sigma;
 
-  // Sampled at the detected pixel; in a keyframe at the refined pixel.
-  SharedArray<Patch> patch;
+  // Sampled at the detected pixel; in a keyframe at the refined pixel. A keyframe that is no longer new has only those
+  // that can be needed (map::BundledMap::release_unused).
+  Patches patch;
 
   Keypoints() = default;
   Keypoints(

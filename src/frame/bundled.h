@@ -38,30 +38,47 @@ class Bundled {
   Bundled(std::span<const std::size_t> keypoint_counts, std::span<const std::vector<KeypointRef>> matched,
           std::span<const std::optional<BundledPoint>> points);
 
-  std::size_t size() const { return begin_.empty() ? 0 : begin_.size() - 1; }  // unique features
+  // The table as arrays, such as a file contains.
+  struct Arrays {
+    SharedArray<KeypointRef> refs;     // of all features, in order
+    SharedArray<std::uint32_t> begin;  // per feature + 1, indices into refs; empty for a table without cameras
+    SharedArray<FeatureId> feature;    // per keypoint, camera by camera
+  };
+  const Arrays& arrays() const { return arrays_; }
+  // Returns nullopt unless the arrays are such as the constructor above makes of matched features: anything that it
+  // demands of them is checked.
+  static std::optional<Bundled> from_arrays(std::span<const std::size_t> keypoint_counts, std::size_t num_matched,
+                                            Arrays arrays, std::span<const std::optional<BundledPoint>> points);
+  // The same table without the points.
+  Bundled without_points() const;
+
+  std::size_t size() const { return arrays_.begin.empty() ? 0 : arrays_.begin.size() - 1; }  // unique features
   std::size_t num_matched() const { return num_matched_; }
   std::size_t num_monocular() const { return size() - num_matched_; }
   bool is_matched(FeatureId f) const { return f.index() < num_matched_; }
 
   std::span<const KeypointRef> keypoints(FeatureId f) const {
-    return {refs_.data() + begin_[f.index()], refs_.data() + begin_[f.index() + 1]};
+    return {arrays_.refs.data() + arrays_.begin[f.index()], arrays_.refs.data() + arrays_.begin[f.index() + 1]};
   }
-  FeatureId feature(CameraIndex c, KeypointIndex k) const { return feature_[camera_begin_[c.index()] + k.index()]; }
+  FeatureId feature(CameraIndex c, KeypointIndex k) const {
+    return arrays_.feature[camera_begin_[c.index()] + k.index()];
+  }
   FeatureId feature(KeypointRef r) const { return feature(r.camera, r.keypoint); }
 
-  // Nullopt for monocular features, and for matched ones without a valid triangulated point.
-  const std::optional<BundledPoint>& point(FeatureId f) const { return is_matched(f) ? points_[f.index()] : kNone; }
+  // Nullopt for monocular features, for matched ones without a valid triangulated point, and if points are not kept.
+  const std::optional<BundledPoint>& point(FeatureId f) const {
+    return is_matched(f) && !points_.empty() ? points_[f.index()] : kNone;
+  }
+  bool has_points() const { return !points_.empty(); }
 
   // The memory of the tables that were not counted before.
   std::size_t memory_bytes(MemoryCount& count) const;
 
  private:
   static inline const std::optional<BundledPoint> kNone;
-  SharedArray<KeypointRef> refs_;
-  SharedArray<std::uint32_t> begin_;       // size() + 1
-  SharedArray<FeatureId> feature_;         // per keypoint, camera by camera
-  SharedArray<std::size_t> camera_begin_;  // per camera + 1
-  SharedArray<std::optional<BundledPoint>> points_;
+  Arrays arrays_;
+  SharedArray<std::size_t> camera_begin_;            // per camera + 1
+  SharedArray<std::optional<BundledPoint>> points_;  // per matched feature, or none
   std::size_t num_matched_ = 0;
 };
 

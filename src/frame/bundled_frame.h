@@ -20,7 +20,7 @@ struct CameraFrame {
   TimeNs time_ns = 0;            // its own capture time
   feature::Keypoints keypoints;  // empty if the image is missing or damaged
   FeatureGrid grid;              // of the keypoints' pixels
-  std::vector<WordId> words;     // per keypoint, word of the vocabulary; empty until computed
+  SharedArray<WordId> words;     // per keypoint, word of the vocabulary; empty until computed
 };
 
 struct BundledFrame {

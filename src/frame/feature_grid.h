@@ -2,15 +2,17 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
-#include "base/shared_array.h"
+#include "base/memory_count.h"
 #include "feature/keypoints.h"
 
 namespace bslam::frame {
 
 // 64 columns by 48 rows of cells over the whole image; cells hold keypoint indices in ascending order.
-// Immutable; copies share the cells.
+// Immutable; copies share the cells. They are filled at the first search, in whichever thread that is, so that
+// keyframes that are never searched need no memory for them.
 class FeatureGrid {
  public:
   static constexpr int kColumns = 64, kRows = 48;
@@ -22,13 +24,15 @@ class FeatureGrid {
   void near(const feature::Keypoints& keypoints, const Eigen::Vector2d& pixel, double radius, int low_level,
             int high_level, std::vector<std::uint32_t>& out) const;
 
+  // The same grid with cells that are not filled yet.
+  FeatureGrid emptied() const;
+
   // The memory of the cells, unless it was counted before.
-  std::size_t memory_bytes(MemoryCount& count) const { return begin_.memory_bytes(count) + index_.memory_bytes(count); }
+  std::size_t memory_bytes(MemoryCount& count) const;
 
  private:
-  float cells_per_px_x_ = 0, cells_per_px_y_ = 0;
-  SharedArray<std::uint32_t> begin_;  // kColumns * kRows + 1, row by row
-  SharedArray<std::uint32_t> index_;
+  struct Cells;
+  std::shared_ptr<Cells> cells_;  // null without keypoints
 };
 
 }  // namespace bslam::frame

@@ -58,8 +58,9 @@ std::size_t BagOfWordsRecogniser::memory_bytes() const { return index_.memory_by
 void BagOfWordsRecogniser::describe(frame::BundledFrame& frame) const {
   for (frame::CameraFrame& c : frame.cameras) {
     if (c.words.size() == c.keypoints.size()) continue;  // already done
-    c.words.resize(c.keypoints.size());
-    vocabulary_->words(c.keypoints.descriptor, c.words);
+    std::vector<WordId> words(c.keypoints.size());
+    vocabulary_->words(c.keypoints.descriptor, words);
+    c.words = std::move(words);
   }
 }
 
@@ -68,7 +69,7 @@ BagOfWordsRecogniser::Words BagOfWordsRecogniser::words_of(const frame::BundledF
   words.reserve(frame.bundled.size());
   for (std::size_t f = 0; f < frame.bundled.size(); ++f) {
     const frame::KeypointRef first = frame.bundled.keypoints(FeatureId(f)).front();
-    const std::vector<WordId>& of_camera = frame.cameras[first.camera.index()].words;
+    const SharedArray<WordId>& of_camera = frame.cameras[first.camera.index()].words;
     if (!of_camera.empty()) words.push_back(of_camera[first.keypoint.index()]);
   }
   return std::make_shared<const place::WordVector>(*vocabulary_, words);

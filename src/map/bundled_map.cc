@@ -123,6 +123,7 @@ std::vector<BundledMap::ReplacedFrame> BundledMap::set_rig(std::shared_ptr<const
   rig_deviation_ = std::move(deviation);
   const std::shared_ptr<const camera::Rig> before = std::exchange(rig_, std::move(rig));
   if (!frame::changes_frames(*before, *rig_)) return out;
+  if (!known.empty()) next_keyframe_to_release_ = 0;  // some of them may have what was released since
   std::map<KeyframeId, std::shared_ptr<const frame::BundledFrame>> frames(known.begin(), known.end());
   for (const KeyframeId k : keyframe_ids()) {
     std::shared_ptr<const frame::BundledFrame>& frame = frames[k];
@@ -211,8 +212,7 @@ bool BundledMap::remove_observation(LandmarkId l, KeyframeId k) {
   if (rest.empty()) {
     mark_removed(l, {});
   } else if (landmark(l).reference.keyframe == k) {
-    const Observation oldest = rest.front();
-    edit(l).reference = {oldest.keyframe, keyframe(oldest.keyframe).frame->bundled.keypoints(oldest.feature).front()};
+    edit(l).reference = reference_among(rest);
   }
   return true;
 }
@@ -340,20 +340,6 @@ bool BundledMap::add_visibility_counts(LandmarkId l, std::uint32_t expected, std
   entry.expected += expected;
   entry.found += found;
   return true;
-}
-
-void BundledMap::free_removed(std::size_t slots) {
-  const std::size_t groups = landmarks_.size() / kLandmarksPerChunk;  // blocks that are full
-  for (std::size_t n = std::min(slots / kLandmarksPerChunk, groups); n > 0; --n) {
-    if (next_chunk_to_free_ >= groups) next_chunk_to_free_ = 0;
-    const std::size_t group = next_chunk_to_free_++;
-    bool gone = true;
-    for (std::size_t l = group * kLandmarksPerChunk; gone && l < (group + 1) * kLandmarksPerChunk; ++l)
-      gone = !landmarks_[l].alive;
-    if (!gone) continue;
-    landmarks_.blank_chunk(group, owner_.tag());
-    observations_.blank_block(group, owner_.tag());
-  }
 }
 
 void BundledMap::link(LandmarkId l, Observation o) {

@@ -5,6 +5,7 @@
 // are valid until its next change.
 #pragma once
 
+#include <functional>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -14,6 +15,7 @@
 #include <vector>
 
 #include "base/id.h"
+#include "base/thread_pool.h"
 #include "camera/rig.h"
 #include "feature/feature_model.h"
 #include "map/bundled_keyframe.h"
@@ -39,6 +41,23 @@ struct MapMemory {
   std::size_t total() const {
     return keyframes + features + descriptors + patches + words + landmarks + observations + covisibility;
   }
+};
+
+// The content of a saved map. Numbers are not checked yet, but that the spans of a landmark or of an observation have
+// equal lengths, and that the counts add up to their number.
+struct MapParts {
+  std::span<const std::shared_ptr<const frame::BundledFrame>> frames;  // of keyframes 0, 1, ...
+  std::span<const geometry::SE3> T_rig_world;
+  std::span<const KeyframeId> parents;            // within range, invalid for roots
+  std::span<const std::uint32_t> counts;          // observations of each landmark
+  std::function<Landmark(std::size_t)> landmark;  // of each index of `counts`
+  std::span<const KeyframeId> observing;          // of all observations, landmark by landmark
+  std::span<const FeatureId> features;
+  std::span<const std::uint8_t> aligned;  // 0 or 1
+};
+struct PartsError {
+  std::optional<std::size_t> landmark;  // to which it belongs
+  std::string found, expected;
 };
 
 class BundledMap {
@@ -165,7 +184,8 @@ class BundledMap {
   // Also returns false if the keyframe already observes the landmark or the feature already has one.
   bool add_observation(LandmarkId l, Observation o);
   // Removing the last observation removes the landmark. If the reference is removed, the first keypoint of the oldest
-  // remaining observation becomes the reference. Also returns false if the keyframe does not observe the landmark.
+  // remaining observation that has a patch becomes the reference. Also returns false if the keyframe does not observe
+  // the landmark.
   bool remove_observation(LandmarkId l, KeyframeId k);
   bool remove_landmark(LandmarkId l);
   // Merges `from` into `into`: observations are moved unless the keyframe already observes `into`, and visibility
@@ -192,9 +212,23 @@ class BundledMap {
   bool add_visibility_counts(LandmarkId l, std::uint32_t expected, std::uint32_t found);
   // Recomputes viewing direction, distance range and descriptor from the observations.
   bool refresh_landmark(LandmarkId l);
+
+  // ---- In release_memory.cc
   // Releases the memory of removed landmarks. Each call visits the next `slots` landmarks in turn, and releases a block
   // of landmarks if none of them is alive.
   void free_removed(std::size_t slots);
+  // Releases what keyframes need only while they are new. Each call visits at most `count` keyframes that it has not
+  // visited yet, and leaves the newest kNewKeyframes alone. The others keep the patches of the references of landmarks,
+  // and those that become the references when other observations are removed: of the first keypoints of features with a
+  // landmark. They lose the points of their features, which became landmarks when the keyframe was new, and cells
+  // of the grids, which a search fills again.
+  void release_unused(std::size_t count);
+  static constexpr std::size_t kNewKeyframes = 64;
+
+  // ---- In fill_map.cc
+  // Fills an empty map. The viewing direction, distances and descriptor of the landmarks are taken as they are. Returns
+  // what is wrong with the parts, if anything is; the map is unusable then. Otherwise it has all invariants.
+  std::optional<PartsError> fill(const MapParts& parts, ThreadPool& pool);
 
  private:
   BundledKeyframe& edit(KeyframeId k) { return keyframes_.mutate(k.index(), owner_.tag()); }
@@ -211,6 +245,12 @@ class BundledMap {
   void unlink(LandmarkId l, Observation o);
   void mark_removed(KeyframeId k);                          // must have no observations or children left
   void mark_removed(LandmarkId l, LandmarkId merged_into);  // must have no observations left
+  LandmarkReference reference_among(std::span<const Observation> observations) const;
+  void release_unused(KeyframeId k);
+
+  // In fill_map.cc.
+  std::optional<PartsError> fill_landmarks(const MapParts& parts, std::vector<std::vector<LandmarkId>>& tables);
+  void fill_tables(std::vector<std::vector<LandmarkId>> tables, ThreadPool& pool);
 
   // In covisibility.cc.
   void change_weight(KeyframeId a, KeyframeId b, int change);
@@ -236,7 +276,8 @@ class BundledMap {
   CowVector<LandmarkId, 64> merged_into_;
   ObservationColumn observations_;
   std::size_t alive_keyframes_ = 0, alive_landmarks_ = 0, observations_total_ = 0;
-  std::size_t next_chunk_to_free_ = 0;  // next block of landmarks that free_removed visits
+  std::size_t next_chunk_to_free_ = 0;        // next block of landmarks that free_removed visits
+  std::size_t next_keyframe_to_release_ = 0;  // next keyframe that release_unused visits
 };
 
 using MapSnapshot = std::shared_ptr<const BundledMap>;

@@ -13,7 +13,7 @@ void add_frame(const frame::BundledFrame& frame, MemoryCount& count, MapMemory& 
     memory.features += keypoints.positions + c.grid.memory_bytes(count);
     memory.descriptors += keypoints.descriptors;
     memory.patches += keypoints.patches;
-    memory.words += bslam::memory_bytes(c.words);
+    memory.words += c.words.memory_bytes(count);
   }
 }
 

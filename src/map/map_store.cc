@@ -3,7 +3,8 @@
 namespace bslam::map {
 namespace {
 
-constexpr std::size_t kSlotsPerCommit = 1024;  // number of landmark slots checked for memory to release
+constexpr std::size_t kSlotsPerCommit = 1024;   // number of landmark slots checked for memory to release
+constexpr std::size_t kKeyframesPerCommit = 4;  // number of keyframes whose unused memory is released at most
 
 }  // namespace
 
@@ -47,6 +48,7 @@ CommitReport MapStore::commit(MapDraft draft) {
     for (std::size_t l = current->landmark_slots(); l < result.landmark_slots(); ++l) report.landmarks.emplace_back(l);
   }
   result.free_removed(kSlotsPerCommit);
+  result.release_unused(kKeyframesPerCommit);
   result.set_version(current->version().next());
   report.published = std::make_shared<const BundledMap>(std::move(result));
   {

@@ -11,6 +11,16 @@ void ObservationColumn::push_back(std::uint64_t tag) {
   ++size_;
 }
 
+void ObservationColumn::append(std::span<const std::uint32_t> counts, std::span<const Observation> observations,
+                               std::uint64_t tag) {
+  BSLAM_ASSERT(size_ % kBlock == 0 && counts.size() <= kBlock, "whole blocks must be appended to whole blocks");
+  Block block;
+  for (std::size_t r = 0; r < kBlock; ++r) block.begin[r + 1] = block.begin[r] + (r < counts.size() ? counts[r] : 0);
+  block.entries.assign(observations.begin(), observations.end());
+  blocks_.push_back(std::move(block), tag);
+  size_ += counts.size();
+}
+
 void ObservationColumn::insert(std::size_t landmark, Observation o, std::uint64_t tag) {
   Block& block = blocks_.mutate(landmark / kBlock, tag);
   const std::size_t row = landmark % kBlock;

@@ -24,6 +24,9 @@ class ObservationColumn {
 
   // Appends a landmark without observations.
   void push_back(std::uint64_t tag);
+  // Appends up to kBlock landmarks with these numbers of observations, which follow each other in `observations`. The
+  // last block must be full.
+  void append(std::span<const std::uint32_t> counts, std::span<const Observation> observations, std::uint64_t tag);
   // The landmark must not have an observation by that keyframe yet.
   void insert(std::size_t landmark, Observation o, std::uint64_t tag);
   // The landmark must have this observation.

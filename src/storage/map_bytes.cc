@@ -25,6 +25,14 @@ std::size_t SectionReader::count(std::size_t bytes_each) {
   return ok() ? n : 0;
 }
 
+void SectionReader::align() {
+  const std::size_t past = bytes_.position() % kAlignment;
+  if (!ok() || past == 0) return;
+  const std::string_view gap = bytes_.take(kAlignment - past);
+  require(bytes_.ok() && gap.find_first_not_of('\0') == std::string_view::npos,
+          "an array that is not filled up with zeros", "zeros");
+}
+
 std::string SectionReader::text() { return std::string(bytes_.take(count(1))); }
 
 bool SectionReader::finish() {

@@ -2,30 +2,41 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <libdeflate.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <memory>
+#include <thread>
 #include <utility>
 
 #include "base/atomic_file.h"
+#include "base/mapped_file.h"
 #include "base/number_text.h"
 #include "map/rigs_of_map.h"
+#include "storage/map_checksum.h"
 #include "storage/map_sections.h"
 
 namespace bslam::storage {
 namespace {
 
 constexpr std::string_view kMagic = "BSLAMMAP";
-constexpr std::uint32_t kOrderMark = 0x01020304, kVersion = 4, kOldestVersion = 2;
+constexpr std::uint32_t kOrderMark = 0x01020304, kVersion = 5, kOldestVersion = 2;
 constexpr std::array<std::string_view, 4> kTags = {"RIG ", "INFO", "KEYF", "LAND"};
 constexpr std::array<const char*, 4> kNames = {"rig", "info", "keyframes", "landmarks"};
 constexpr std::size_t kTableEntryBytes = 4 + 4 + 8;
 constexpr std::size_t kHeaderBytes = 8 + 3 * 4 + 8 + kTags.size() * kTableEntryBytes + 4;
 constexpr std::size_t kMaxMapBytes = std::size_t{1} << 36;
 
-std::uint32_t checksum(std::string_view bytes) { return libdeflate_crc32(0, bytes.data(), bytes.size()); }
+constexpr std::size_t kMappedBytes = std::size_t{1} << 26;  // smaller files are read as a whole
+constexpr std::size_t kParallelBytes = std::size_t{1} << 20;
+constexpr int kMaxThreads = 8;
+
+// Threads to write or read so many bytes.
+int threads_for(std::size_t bytes) {
+  if (bytes < kParallelBytes) return 1;
+  return std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, kMaxThreads);
+}
 
 struct Sections {
   std::uint32_t version = kVersion;
@@ -33,7 +44,7 @@ struct Sections {
   std::array<std::uint32_t, kTags.size()> checksums = {};
 };
 
-std::string header_of(const std::array<std::string, kTags.size()>& sections) {
+std::string header_of(const std::array<std::string, kTags.size()>& sections, ThreadPool& pool) {
   std::size_t total = kHeaderBytes;
   for (const std::string& s : sections) total += s.size();
   ByteWriter out;
@@ -44,12 +55,12 @@ std::string header_of(const std::array<std::string, kTags.size()>& sections) {
   out.number(std::uint64_t{total});
   for (std::size_t i = 0; i < kTags.size(); ++i) {
     out.numbers(kTags[i].data(), kTags[i].size());
-    out.number(checksum(sections[i]));
+    out.number(section_checksum(sections[i], pool));
     out.number(std::uint64_t{sections[i].size()});
   }
   std::string header = std::move(out).take();
   ByteWriter seal;
-  seal.number(checksum(header));
+  seal.number(crc32_of(header));
   return header + std::move(seal).take();
 }
 
@@ -58,7 +69,7 @@ Error damaged(std::string_view section, std::string found, std::string expected)
 }
 
 // Returns the sections of a complete file after verifying their checksums. Error.file is left empty.
-Result<Sections> take_apart(std::string_view bytes) {
+Result<Sections> take_apart(std::string_view bytes, ThreadPool& pool) {
   if (!bytes.starts_with(kMagic))
     return damaged("", "a file of another format", fmt::format("a saved map, which begins with {}", kMagic));
   if (bytes.size() < kHeaderBytes) return damaged("header", fmt::format("{} bytes", bytes.size()), "a complete header");
@@ -81,7 +92,7 @@ Result<Sections> take_apart(std::string_view bytes) {
     e.checksum = in.number<std::uint32_t>();
     e.size = in.number<std::uint64_t>();
   }
-  if (in.number<std::uint32_t>() != checksum(bytes.substr(0, kHeaderBytes - 4)) || count != kTags.size()) {
+  if (in.number<std::uint32_t>() != crc32_of(bytes.substr(0, kHeaderBytes - 4)) || count != kTags.size()) {
     return damaged("header", "a wrong checksum", "an undamaged file");
   }
   if (total != bytes.size()) return damaged("size", fmt::format("{} bytes", bytes.size()), std::to_string(total));
@@ -96,28 +107,43 @@ Result<Sections> take_apart(std::string_view bytes) {
     sections.bytes[i] = rest.substr(0, e.size);
     sections.checksums[i] = e.checksum;
     rest.remove_prefix(e.size);
-    if (checksum(sections.bytes[i]) != e.checksum) return damaged(kNames[i], "a wrong checksum", "an undamaged file");
+    const std::uint32_t found = version >= 5 ? section_checksum(sections.bytes[i], pool) : crc32_of(sections.bytes[i]);
+    if (found != e.checksum) return damaged(kNames[i], "a wrong checksum", "an undamaged file");
   }
   if (!rest.empty()) return damaged("size", "bytes after the last section", "the end of the file");
   return sections;
 }
 
-Result<SavedMap> build(const Sections& sections, std::string file) {
-  const auto reader = [&](std::size_t i) { return SectionReader(sections.bytes[i], kNames[i]); };
+// What the sections of keyframes and landmarks contradict each other in.
+Error error_of(const map::PartsError& error) {
+  std::string key = error.landmark ? fmt::format("landmarks, landmark {}", *error.landmark) : "keyframes";
+  return damaged(key, error.found, error.expected);
+}
+
+Result<SavedMap> build(const Sections& sections, std::string file, const std::shared_ptr<const void>& owner,
+                       ThreadPool& pool) {
+  const auto reader = [&](std::size_t i) { return SectionReader(sections.bytes[i], kNames[i], owner); };
   SectionReader rig_in = reader(0), info_in = reader(1), keyframes_in = reader(2), landmarks_in = reader(3);
   auto rigs = take_rigs(rig_in, sections.version);
   if (!rigs) return rig_in.error();
-  InfoSection info = take_info(info_in);
+  InfoSection info = take_info(info_in, sections.version);
   if (!info_in.ok()) return info_in.error();
   SavedMap saved{std::move(file), map::BundledMap(rigs->rig, info.pyramid), std::move(info.info)};
   saved.checksums = sections.checksums;
   saved.map.set_given_rig(rigs->given);
   saved.map.set_scale(info.scale);
-  saved.words_end = take_keyframes(keyframes_in, saved.info.vocabulary != 0, saved.map);
+  const bool with_words = saved.info.vocabulary != 0, old = sections.version < 5;
+  const KeyframeSection k = old ? take_keyframes_4(keyframes_in, with_words, saved.map)
+                                : take_keyframes(keyframes_in, with_words, saved.map, pool);
   if (!keyframes_in.ok()) return keyframes_in.error();
-  take_landmarks(landmarks_in, saved.map);
+  saved.words_end = k.words_end;
+  const LandmarkSection l = old ? take_landmarks_4(landmarks_in) : take_landmarks(landmarks_in);
   if (!landmarks_in.ok()) return landmarks_in.error();
-  if (auto broken = saved.map.check_invariants()) return damaged("", *std::move(broken), "a consistent map");
+  const map::MapParts parts{
+      k.frames,    k.T_rig_world, k.parents, l.counts, [&l](std::size_t i) { return l.landmark(i); },
+      l.observing, l.features,    l.aligned};
+  if (const auto error = saved.map.fill(parts, pool)) return error_of(*error);
+  for (std::size_t i = 0; old && i < saved.map.landmark_slots(); ++i) saved.map.refresh_landmark(LandmarkId(i));
   return saved;
 }
 
@@ -131,8 +157,12 @@ std::string map_to_bytes(const map::BundledMap& map, const MapFileInfo& info) {
   put_keyframes(map, ids, info.vocabulary != 0, writers[2]);
   put_landmarks(map, ids, writers[3]);
   std::array<std::string, kTags.size()> sections;
-  for (std::size_t i = 0; i < kTags.size(); ++i) sections[i] = std::move(writers[i]).take();
-  std::string bytes = header_of(sections);
+  for (std::size_t i = 0; i < kTags.size(); ++i) {
+    writers[i].align();  // so that each section begins at a multiple of kAlignment
+    sections[i] = std::move(writers[i]).take();
+  }
+  ThreadPool pool(threads_for(sections[2].size()));
+  std::string bytes = header_of(sections, pool);
   std::size_t total = bytes.size();
   for (const std::string& s : sections) total += s.size();
   bytes.reserve(total);
@@ -143,16 +173,27 @@ std::string map_to_bytes(const map::BundledMap& map, const MapFileInfo& info) {
   return bytes;
 }
 
-Result<SavedMap> map_from_bytes(std::string_view bytes, std::string file) {
+namespace {
+
+// `owner`: of the bytes.
+Result<SavedMap> map_in(std::string_view bytes, const std::string& file, const std::shared_ptr<const void>& owner) {
   const auto named = [&](Error error) {
     error.file = file;
     return error;
   };
-  const auto sections = take_apart(bytes);
+  ThreadPool pool(threads_for(bytes.size()));
+  const auto sections = take_apart(bytes, pool);
   if (!sections) return named(sections.error());
-  auto saved = build(*sections, file);
+  auto saved = build(*sections, file, owner, pool);
   if (!saved) return named(saved.error());
   return saved;
+}
+
+}  // namespace
+
+Result<SavedMap> map_from_bytes(std::string_view bytes, std::string file) {
+  const auto copy = std::make_shared<const std::string>(bytes);
+  return map_in(*copy, file, copy);
 }
 
 Status write_map(const map::BundledMap& map, const MapFileInfo& info, const std::filesystem::path& file) {
@@ -164,9 +205,18 @@ Status write_map(const map::BundledMap& map, const MapFileInfo& info, const std:
 }
 
 Result<SavedMap> read_map(const std::filesystem::path& file) {
-  const auto bytes = read_file(file, kMaxMapBytes);
+  std::error_code unknown;
+  if (std::filesystem::is_regular_file(file, unknown) && std::filesystem::file_size(file, unknown) >= kMappedBytes) {
+    const auto mapped = MappedFile::open(file, kMaxMapBytes);
+    if (!mapped) return mapped.error();
+    auto saved = map_in(mapped->bytes(), file.string(), mapped->owner());
+    mapped->release();
+    return saved;
+  }
+  auto bytes = read_file(file, kMaxMapBytes);
   if (!bytes) return bytes.error();
-  return map_from_bytes(*bytes, file.string());
+  const auto owned = std::make_shared<const std::string>(*std::move(bytes));
+  return map_in(*owned, file.string(), owned);
 }
 
 Result<SavedMap> open_map(const std::filesystem::path& file, const camera::Rig& rig,

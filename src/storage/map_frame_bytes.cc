@@ -1,4 +1,6 @@
-// Writes and reads the BundledFrames of saved maps.
+// Writes and reads the BundledFrames of saved maps. What is read are arrays in the bytes of the file, if they can be
+// used where they are.
+#include <bit>
 #include <cmath>
 #include <utility>
 
@@ -12,58 +14,177 @@ using feature::Keypoints;
 using feature::Patch;
 using frame::KeypointRef;
 
-// Pixel, level, angle, sigma, bearing, descriptor and patch of one keypoint. The bearing is stored, since it was
-// computed before the pixel was rounded to float and cannot be recomputed exactly.
-constexpr std::size_t kKeypointBytes = 8 + 1 + 4 + 4 + 24 + 32 + sizeof(Patch);
-constexpr std::size_t kMatchedBytes = 1 + 2 * (2 + 4) + 1;  // minimum
 constexpr double kUnitTolerance = 1e-6;
 constexpr double kMaxTwist = 1e6;             // rad/s, m/s
 constexpr TimeNs kMaxTime = TimeNs{1} << 62;  // bounded so that differences do not overflow
+constexpr std::size_t kPointNumbers = 3 + 9;  // of a triangulated point and its covariance
 
-// Arrays of these types are read and written as arrays of numbers.
+// Arrays of these types are written and read as arrays of numbers.
 static_assert(sizeof(Eigen::Vector2f) == 2 * sizeof(float) && sizeof(Eigen::Vector3d) == 3 * sizeof(double));
 static_assert(sizeof(Descriptor) == 4 * sizeof(std::uint64_t) &&
               sizeof(Patch) == feature::kPatchSize * feature::kPatchSize);
+static_assert(sizeof(WordId) == sizeof(std::int32_t) && sizeof(FeatureId) == sizeof(std::int32_t) &&
+              sizeof(KeypointRef) == 2 * sizeof(std::int32_t));
+
+const std::int32_t* numbers_of(const SharedArray<WordId>& ids) {
+  return reinterpret_cast<const std::int32_t*>(ids.data());
+}
 
 void put_camera(const frame::CameraFrame& camera, bool with_words, ByteWriter& out) {
   const Keypoints& k = camera.keypoints;
   const std::size_t n = k.size();
-  out.number(static_cast<std::uint8_t>(camera.state));
-  out.number(camera.time_ns);
-  out.count(n);
-  if (n > 0) {
-    out.numbers(k.pixel.data()->data(), 2 * n);
-    out.numbers(k.level.data(), n);
-    out.numbers(k.angle.data(), n);
-    out.numbers(k.sigma.data(), n);
-    out.numbers(k.bearing.data()->data(), 3 * n);
-    out.numbers(k.descriptor.data()->data(), 4 * n);
-    out.numbers(k.patch.data()->data(), n * sizeof(Patch));
-  }
   const bool has_words = with_words && camera.words.size() == n;
-  out.number(static_cast<std::uint8_t>(has_words));
-  for (std::size_t i = 0; has_words && i < n; ++i) out.number(camera.words[i].value());
+  out.number(static_cast<std::uint32_t>(camera.state));
+  out.count(n);
+  out.number(camera.time_ns);
+  out.number(static_cast<std::uint32_t>(has_words));
+  out.count(k.patch.patches().size());
+  if (n == 0) return;
+  out.array(k.pixel.data()->data(), 2 * n);
+  out.array(k.level.data(), n);
+  out.array(k.angle.data(), n);
+  out.array(k.sigma.data(), n);
+  out.array(k.bearing.data()->data(), 3 * n);
+  out.array(k.descriptor.data()->data(), 4 * n);
+  if (has_words) out.array(numbers_of(camera.words), n);
+  if (!k.patch.complete()) out.array(k.patch.present().data(), k.patch.present().size());
+  if (!k.patch.patches().empty()) out.array(k.patch.patches().data()->data(), k.patch.patches().size() * sizeof(Patch));
 }
 
-Keypoints take_keypoints(SectionReader& in) {
-  const std::size_t n = in.count(kKeypointBytes);
-  if (n == 0) return {};
-  feature::Detections k;
-  k.pixel.resize(n);
-  k.level.resize(n);
-  k.angle.resize(n);
-  k.sigma.resize(n);
-  k.bearing.resize(n);
-  k.descriptor.resize(n);
-  k.patch.resize(n);
-  in.numbers(k.pixel.data()->data(), 2 * n);
-  in.numbers(k.level.data(), n);
-  in.numbers(k.angle.data(), n);
-  in.numbers(k.sigma.data(), n);
-  in.numbers(k.bearing.data()->data(), 3 * n);
-  in.numbers(k.descriptor.data()->data(), 4 * n);
-  in.numbers(k.patch.data()->data(), n * sizeof(Patch));
+feature::Patches take_patches(SectionReader& in, std::size_t keypoints, std::size_t patches) {
+  SharedArray<std::uint64_t> present;
+  if (patches < keypoints) {
+    present = in.array<std::uint64_t>((keypoints + 63) / 64);
+    std::size_t bits = 0;
+    for (const std::uint64_t word : present) bits += static_cast<std::size_t>(std::popcount(word));
+    if (in.ok() && keypoints % 64 != 0) bits += std::size_t{present.back() >> (keypoints % 64) != 0};
+    in.require(bits == patches, "marks of patches that do not agree with their number", "one mark per patch");
+  }
+  auto values = in.array<std::uint8_t, Patch>(patches);
+  if (!in.ok()) return {};
+  return {std::move(values), std::move(present), keypoints};
+}
+
+Keypoints take_keypoints(SectionReader& in, std::size_t n) {
+  Keypoints k;
+  k.pixel = in.array<float, Eigen::Vector2f>(n);
+  k.level = in.array<std::uint8_t>(n);
+  k.angle = in.array<float>(n);
+  k.sigma = in.array<float>(n);
+  k.bearing = in.array<double, Eigen::Vector3d>(n);
+  k.descriptor = in.array<std::uint64_t, Descriptor>(n);
   return k;
+}
+
+void take_camera(SectionReader& in, const camera::Camera& calibration, int levels, bool with_words,
+                 std::size_t& words_end, frame::CameraFrame& camera) {
+  const auto state = in.number<std::uint32_t>();
+  const std::size_t n = in.number<std::uint32_t>();
+  camera.time_ns = in.number<TimeNs>();
+  const auto has_words = in.number<std::uint32_t>();
+  const std::size_t patches = in.number<std::uint32_t>();
+  if (!check_image(in, state, camera) || !in.require(has_words <= 1, "an invalid flag", "0 or 1 (words follow)") ||
+      !in.require(has_words == 0 || with_words, "words", "none, since the map has no vocabulary") ||
+      !in.require(patches <= n, "more patches than keypoints", "at most one patch per keypoint") || n == 0) {
+    return;
+  }
+  camera.keypoints = take_keypoints(in, n);
+  if (!in.ok() || !check_keypoints(in, camera.keypoints, calibration, levels)) return;
+  if (has_words == 1) camera.words = in.array<std::int32_t, WordId>(n);
+  for (const WordId word : camera.words) {
+    if (!in.require(word.valid(), "a negative word", "words of the vocabulary")) return;
+    words_end = std::max(words_end, word.index() + 1);
+  }
+  camera.keypoints.patch = take_patches(in, n, patches);
+  if (in.ok()) camera.grid = frame::FeatureGrid(camera.keypoints, calibration.width, calibration.height);
+}
+
+void put_bundled(const frame::Bundled& bundled, ByteWriter& out) {
+  const frame::Bundled::Arrays& arrays = bundled.arrays();
+  out.count(bundled.num_matched());
+  out.count(bundled.size());
+  out.number(static_cast<std::uint32_t>(bundled.has_points()));
+  out.number(std::uint32_t{0});
+  const std::uint32_t zero = 0;
+  out.array(arrays.begin.empty() ? &zero : arrays.begin.data(), bundled.size() + 1);
+  out.array(reinterpret_cast<const std::int32_t*>(arrays.refs.data()), 2 * arrays.refs.size());
+  out.array(reinterpret_cast<const std::int32_t*>(arrays.feature.data()), arrays.feature.size());
+  if (!bundled.has_points()) return;
+  std::vector<std::uint8_t> flags;
+  std::vector<double> numbers;
+  for (std::size_t f = 0; f < bundled.num_matched(); ++f) {
+    const auto& point = bundled.point(FeatureId(f));
+    flags.push_back(static_cast<std::uint8_t>(point.has_value()));
+    if (!point) continue;
+    numbers.insert(numbers.end(), point->point_rig.data(), point->point_rig.data() + 3);
+    numbers.insert(numbers.end(), point->covariance.data(), point->covariance.data() + 9);
+  }
+  out.array(flags.data(), flags.size());
+  out.array(numbers.data(), numbers.size());
+}
+
+std::vector<std::optional<frame::BundledPoint>> take_points(SectionReader& in, std::size_t matched) {
+  const SharedArray<std::uint8_t> flags = in.array<std::uint8_t>(matched);
+  std::size_t count = 0;
+  bool valid = true;
+  for (const std::uint8_t flag : flags) {
+    valid &= flag <= 1;
+    count += flag;
+  }
+  in.require(valid, "an invalid flag", "0 or 1 (a point follows)");
+  const SharedArray<double> numbers = in.array<double>(in.ok() ? kPointNumbers * count : 0);
+  std::vector<std::optional<frame::BundledPoint>> points(in.ok() ? matched : 0);
+  const double* at = numbers.data();
+  for (std::size_t f = 0; f < points.size(); ++f) {
+    if (flags[f] == 0) continue;
+    const frame::BundledPoint point{Eigen::Vector3d(at), Eigen::Matrix3d(at + 3)};
+    in.require(is_plausible(point.point_rig) && point.covariance.allFinite(), "an invalid point", "finite numbers");
+    points[f] = point;
+    at += kPointNumbers;
+  }
+  return points;
+}
+
+void take_bundled(SectionReader& in, frame::BundledFrame& frame) {
+  std::vector<std::size_t> counts;
+  std::size_t keypoints = 0;
+  for (const frame::CameraFrame& c : frame.cameras) {
+    counts.push_back(c.keypoints.size());
+    keypoints += counts.back();
+  }
+  const std::size_t matched = in.number<std::uint32_t>(), features = in.number<std::uint32_t>();
+  const auto has_points = in.number<std::uint32_t>(), unused = in.number<std::uint32_t>();
+  if (!in.require(has_points <= 1 && unused == 0, "an invalid flag", "0 or 1 (points follow)") ||
+      !in.require(matched <= features && features <= keypoints, "more features than keypoints",
+                  "each keypoint in one feature")) {
+    return;
+  }
+  frame::Bundled::Arrays arrays;
+  arrays.begin = in.array<std::uint32_t>(features + 1);
+  arrays.refs = in.array<std::int32_t, KeypointRef>(keypoints);
+  arrays.feature = in.array<std::int32_t, FeatureId>(keypoints);
+  std::vector<std::optional<frame::BundledPoint>> points;
+  if (in.ok() && has_points == 1) points = take_points(in, matched);
+  if (!in.ok()) return;
+  auto bundled = frame::Bundled::from_arrays(counts, matched, std::move(arrays), points);
+  if (in.require(bundled.has_value(), "a table of features that contradicts itself", "each keypoint in one feature"))
+    frame.bundled = *std::move(bundled);
+}
+
+}  // namespace
+
+bool check_image(SectionReader& in, std::uint32_t state, frame::CameraFrame& camera) {
+  if (!in.require(state <= static_cast<std::uint32_t>(image::ImageState::kDamaged), "an unknown image state",
+                  "present, missing or damaged"))
+    return false;
+  camera.state = static_cast<image::ImageState>(state);
+  return in.require(std::abs(camera.time_ns / 2) < kMaxTime / 2, "a time out of range", "nanoseconds");
+}
+
+bool check_frame(SectionReader& in, const frame::BundledFrame& frame) {
+  return in.require(std::abs(frame.time_ns / 2) < kMaxTime / 2, "a time out of range", "nanoseconds") &&
+         in.require(frame.twist.allFinite() && frame.twist.cwiseAbs().maxCoeff() < kMaxTwist, "an invalid twist",
+                    "finite numbers in rad/s and m/s");
 }
 
 // Pixels may be outside of the image, but not by more than its size.
@@ -71,125 +192,17 @@ bool check_keypoints(SectionReader& in, const Keypoints& k, const camera::Camera
   const auto width = static_cast<float>(camera.width), height = static_cast<float>(camera.height);
   const auto within = [](float value, float size) { return value >= -size && value <= 2 * size; };  // false for NaN
   bool pixels = true, on_levels = true, numbers = true, unit = true;
-  for (std::size_t i = 0; i < k.size(); ++i) {
-    pixels &= within(k.pixel[i].x(), width) && within(k.pixel[i].y(), height);
-    on_levels &= k.level[i] < levels;
+  for (const Eigen::Vector2f& p : k.pixel) pixels &= within(p.x(), width) && within(p.y(), height);
+  for (const std::uint8_t level : k.level) on_levels &= level < levels;
+  for (std::size_t i = 0; i < k.size(); ++i)
     numbers &= std::isfinite(k.angle[i]) && std::isfinite(k.sigma[i]) && k.sigma[i] > 0;
-    unit &= std::abs(k.bearing[i].squaredNorm() - 1) <= kUnitTolerance;
-  }
+  for (const Eigen::Vector3d& b : k.bearing) unit &= std::abs(b.squaredNorm() - 1) <= kUnitTolerance;
   return in.require(pixels, "a keypoint far outside of the image", "pixels of the camera") &&
          in.require(on_levels, "a keypoint on a level that does not exist", "levels of the pyramid") &&
          in.require(numbers, "an invalid angle or standard deviation",
                     "finite numbers and positive standard deviations") &&
          in.require(unit, "a bearing that is not a unit vector", "unit vectors");
 }
-
-void take_words(SectionReader& in, frame::CameraFrame& camera, bool with_words, std::size_t& words_end) {
-  const auto has_words = in.number<std::uint8_t>();
-  if (!in.require(has_words <= 1, "an invalid flag", "0 or 1 (words follow)")) return;
-  if (has_words == 0 || !in.require(with_words, "words", "none, since the map has no vocabulary")) return;
-  const std::size_t n = camera.keypoints.size();
-  if (!in.require(n <= in.remaining() / sizeof(std::int32_t), "the end of the section", "one word per keypoint"))
-    return;
-  camera.words.reserve(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    const WordId word(in.number<std::int32_t>());
-    if (!in.require(word.valid(), "a negative word", "words of the vocabulary")) return;
-    words_end = std::max(words_end, word.index() + 1);
-    camera.words.push_back(word);
-  }
-}
-
-void take_camera(SectionReader& in, const camera::Camera& calibration, int levels, bool with_words,
-                 std::size_t& words_end, frame::CameraFrame& camera) {
-  const auto state = in.number<std::uint8_t>();
-  if (!in.require(state <= static_cast<int>(image::ImageState::kDamaged), "an unknown image state",
-                  "present, missing or damaged"))
-    return;
-  camera.state = static_cast<image::ImageState>(state);
-  camera.time_ns = in.number<TimeNs>();
-  if (!in.require(std::abs(camera.time_ns / 2) < kMaxTime / 2, "a time out of range", "nanoseconds")) return;
-  camera.keypoints = take_keypoints(in);
-  if (!in.ok() || !check_keypoints(in, camera.keypoints, calibration, levels)) return;
-  take_words(in, camera, with_words, words_end);
-  if (!in.ok() || camera.keypoints.empty()) return;
-  camera.grid = frame::FeatureGrid(camera.keypoints, calibration.width, calibration.height);
-}
-
-void put_bundled(const frame::Bundled& bundled, ByteWriter& out) {
-  out.count(bundled.num_matched());
-  for (std::size_t f = 0; f < bundled.num_matched(); ++f) {
-    const auto refs = bundled.keypoints(FeatureId(f));
-    out.number(static_cast<std::uint8_t>(refs.size()));
-    for (const KeypointRef r : refs) {
-      out.number(static_cast<std::uint16_t>(r.camera.value()));
-      out.number(static_cast<std::uint32_t>(r.keypoint.value()));
-    }
-    const auto& point = bundled.point(FeatureId(f));
-    out.number(static_cast<std::uint8_t>(point.has_value()));
-    if (point) {
-      out.numbers(point->point_rig.data(), 3);
-      out.numbers(point->covariance.data(), 9);
-    }
-  }
-}
-
-// Reads one matched feature. `taken` has a flag for every keypoint of every camera, set when a feature uses it.
-std::vector<KeypointRef> take_group(SectionReader& in, const frame::BundledFrame& frame,
-                                    std::vector<std::vector<std::uint8_t>>& taken) {
-  const std::size_t size = in.number<std::uint8_t>();
-  std::vector<KeypointRef> group;
-  if (!in.require(size >= 2 && size <= frame.cameras.size(), "a matched feature with too few or too many keypoints",
-                  "two or more keypoints, at most one per camera")) {
-    return group;
-  }
-  for (std::size_t i = 0; i < size; ++i) {
-    const std::size_t c = in.number<std::uint16_t>(), k = in.number<std::uint32_t>();
-    if (!in.require(c < frame.cameras.size() && k < frame.cameras[c].keypoints.size(), "a keypoint that does not exist",
-                    "a keypoint of the frame") ||
-        !in.require(group.empty() || group.back().camera.index() < c, "cameras out of order or repeated",
-                    "one keypoint per camera") ||
-        !in.require(!std::exchange(taken[c][k], std::uint8_t{1}), "a keypoint of two features",
-                    "one feature per keypoint")) {
-      break;
-    }
-    group.push_back({CameraIndex(c), KeypointIndex(k)});
-  }
-  return group;
-}
-
-std::optional<frame::BundledPoint> take_point(SectionReader& in) {
-  const auto has_point = in.number<std::uint8_t>();
-  if (!in.require(has_point <= 1, "an invalid flag", "0 or 1 (a point follows)") || has_point == 0) return {};
-  frame::BundledPoint point;
-  in.numbers(point.point_rig.data(), 3);
-  in.numbers(point.covariance.data(), 9);
-  in.require(is_plausible(point.point_rig) && point.covariance.allFinite(), "an invalid point", "finite numbers");
-  return point;
-}
-
-void take_bundled(SectionReader& in, frame::BundledFrame& frame) {
-  std::vector<std::size_t> counts;
-  std::vector<std::vector<std::uint8_t>> taken;
-  for (const frame::CameraFrame& c : frame.cameras) {
-    counts.push_back(c.keypoints.size());
-    taken.emplace_back(c.keypoints.size(), std::uint8_t{0});
-  }
-  const std::size_t matched = in.count(kMatchedBytes);
-  std::vector<std::vector<KeypointRef>> groups;
-  std::vector<std::optional<frame::BundledPoint>> points;
-  groups.reserve(matched);
-  points.reserve(matched);
-  for (std::size_t f = 0; f < matched && in.ok(); ++f) {
-    in.enter("feature", f);
-    groups.push_back(take_group(in, frame, taken));
-    points.push_back(take_point(in));
-    in.leave();
-  }
-  if (in.ok()) frame.bundled = frame::Bundled(counts, groups, points);
-}
-
-}  // namespace
 
 void put_frame(const frame::BundledFrame& frame, const geometry::Vector6d& twist, bool with_words, ByteWriter& out) {
   out.number(frame.id.value());
@@ -204,11 +217,8 @@ frame::BundledFrame take_frame(SectionReader& in, const camera::Rig& rig, const 
   frame::BundledFrame frame;
   frame.id = FrameId(in.number<std::int32_t>());
   frame.time_ns = in.number<TimeNs>();
-  if (!in.require(std::abs(frame.time_ns / 2) < kMaxTime / 2, "a time out of range", "nanoseconds")) return frame;
   in.numbers(frame.twist.data(), 6);
-  if (!in.require(frame.twist.allFinite() && frame.twist.cwiseAbs().maxCoeff() < kMaxTwist, "an invalid twist",
-                  "finite numbers in rad/s and m/s"))
-    return frame;
+  if (!check_frame(in, frame)) return frame;
   frame.cameras.resize(rig.size());
   for (std::size_t c = 0; c < rig.size() && in.ok(); ++c) {
     in.enter("camera", c);

@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "camera/camera_description.h"
-#include "map/append_map.h"
 
 namespace bslam::storage {
 namespace {
@@ -17,8 +16,6 @@ constexpr double kUnitTolerance = 1e-12;
 constexpr double kMaxCoordinate = 1e30;  // metres, or units of a map without metric scale
 constexpr int kMaxLevels = 32;
 constexpr std::size_t kCameraBytes = 3 * 4 + 2 * 4 + 4 * 8 + kTransformBytes + 8 + 4;  // minimum
-constexpr std::size_t kObservationBytes = 4 + 4 + 1;
-constexpr std::size_t kLandmarkBytes = 3 * 8 + 4 + 2 + 4 + 3 * 4 + 4 + kObservationBytes;
 
 // The constructor of SE3 normalises its quaternion, which may change the last bits of one that is already normalised.
 // Since `q` is the result of a normalisation, its multiples differ only by rounding, and one of the first few
@@ -79,64 +76,6 @@ void take_readouts(SectionReader& in, std::vector<camera::RigCamera>& cameras) {
     camera.camera.readout_s = in.number<double>();
     in.require(std::abs(camera.camera.readout_s) <= 1, "an invalid readout time", "at most 1 second");
   }
-}
-
-bool in_range(std::int32_t id, std::size_t end) { return id >= 0 && static_cast<std::size_t>(id) < end; }
-
-// Reads the observations of a landmark and checks that they exist in `map`.
-std::vector<map::Observation> take_observations(SectionReader& in, const map::BundledMap& map) {
-  const std::size_t n = in.count(kObservationBytes);
-  std::vector<map::Observation> observations;
-  if (!in.require(n > 0, "no observation", "one or more observations")) return observations;
-  observations.reserve(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    const auto k = in.number<std::int32_t>(), f = in.number<std::int32_t>();
-    const auto aligned = in.number<std::uint8_t>();
-    if (!in.require(in_range(k, map.keyframe_slots()), "observation by a keyframe that does not exist",
-                    "a keyframe of the map") ||
-        !in.require(i == 0 || observations.back().keyframe.value() < k, "observations out of order",
-                    "increasing keyframe ids") ||
-        !in.require(in_range(f, map.keyframe(KeyframeId(k)).landmarks.size()),
-                    "observation by a feature that does not exist", "a feature of the keyframe") ||
-        !in.require(!map.landmark_of(KeyframeId(k), FeatureId(f)).valid(), "a feature of two landmarks",
-                    "one landmark per feature") ||
-        !in.require(aligned <= 1, "an invalid flag", "0 or 1 (the observation is aligned)")) {
-      break;
-    }
-    observations.push_back({KeyframeId(k), FeatureId(f), aligned == 1});
-  }
-  return observations;
-}
-
-bool is_among(const map::LandmarkReference& reference, const std::vector<map::Observation>& observations,
-              const map::BundledMap& map) {
-  for (const map::Observation& o : observations) {
-    if (o.keyframe != reference.keyframe) continue;
-    const auto refs = map.keyframe(o.keyframe).frame->bundled.keypoints(o.feature);
-    return std::find(refs.begin(), refs.end(), reference.keypoint) != refs.end();
-  }
-  return false;
-}
-
-void take_landmark(SectionReader& in, map::BundledMap& map) {
-  Vector3d position;
-  in.numbers(position.data(), 3);
-  map::LandmarkReference reference;
-  reference.keyframe = KeyframeId(in.number<std::int32_t>());
-  reference.keypoint.camera = CameraIndex(std::size_t{in.number<std::uint16_t>()});
-  reference.keypoint.keypoint = KeypointIndex(in.number<std::int32_t>());
-  const auto born = in.number<std::int32_t>();
-  const auto expected = in.number<std::uint32_t>(), found = in.number<std::uint32_t>();
-  const std::vector<map::Observation> observations = take_observations(in, map);
-  if (!in.ok() || !in.require(is_plausible(position), "an invalid position", "finite coordinates") ||
-      !in.require(in_range(born, map.keyframe_slots()), "a creating keyframe that does not exist",
-                  "a keyframe of the map") ||
-      !in.require(is_among(reference, observations, map), "a reference that is not an observation",
-                  "an observation of the landmark")) {
-    return;
-  }
-  const LandmarkId l = map.add_landmark(position, observations, reference, KeyframeId(born));
-  map.add_visibility_counts(l, expected, found);
 }
 
 }  // namespace
@@ -227,6 +166,7 @@ std::optional<RigSection> take_rigs(SectionReader& in, std::uint32_t version) {
   RigSection section;
   section.rig = section.given = take_cameras(in, n, version);
   if (in.ok() && version >= 3) section.given = take_cameras(in, n, version);
+  if (version >= 5) in.align();
   if (!in.finish()) return {};
   return section;
 }
@@ -239,19 +179,19 @@ void put_info(const map::BundledMap& map, const MapFileInfo& info, ByteWriter& o
   out.number(info.vocabulary);
   out.text(info.version);
   out.text(info.data);
-  if (!info.warning.empty()) out.text(info.warning);
+  out.text(info.warning);
 }
 
-InfoSection take_info(SectionReader& in) {
+InfoSection take_info(SectionReader& in, std::uint32_t version) {
   InfoSection section;
   section.pyramid.scale_factor = in.number<double>();
   section.pyramid.levels = in.number<std::int32_t>();
   const auto scale = in.number<std::uint8_t>();
   const std::string kind = in.text();
   section.info = {in.number<std::uint64_t>(), in.text(), in.text(), {}};
-  if (in.remaining() > 0) {
+  if (version >= 5 || in.remaining() > 0) {
     section.info.warning = in.text();
-    in.require(!section.info.warning.empty(), "an empty warning", "a warning, or none");
+    in.require(version >= 5 || !section.info.warning.empty(), "an empty warning", "a warning, or none");
   }
   section.scale = static_cast<map::Scale>(scale);
   const bool pyramid = section.pyramid.scale_factor > 1 && section.pyramid.scale_factor <= 4 &&
@@ -260,71 +200,9 @@ InfoSection take_info(SectionReader& in) {
   in.require(scale <= static_cast<int>(map::Scale::kUnobservable), "an unknown scale",
              "metric, up to scale or unobservable");
   in.require(kind == place::kDescriptorKind, "features of kind " + kind, std::string(place::kDescriptorKind));
+  if (version >= 5) in.align();
   in.finish();
   return section;
-}
-
-void put_keyframes(const map::BundledMap& map, const FileIds& ids, bool with_words, ByteWriter& out) {
-  out.count(map.num_keyframes());
-  for (const KeyframeId k : map.keyframe_ids()) {
-    const map::BundledKeyframe& keyframe = map.keyframe(k);
-    put_transform(keyframe.T_rig_world, out);
-    out.number(keyframe.parent.valid() ? ids.keyframe[keyframe.parent.index()].value() : -1);
-    put_frame(*keyframe.frame, keyframe.twist, with_words, out);
-  }
-}
-
-std::size_t take_keyframes(SectionReader& in, bool with_words, map::BundledMap& map) {
-  constexpr std::size_t kKeyframeBytes = kTransformBytes + 4 + 4 + 8 + 4;
-  constexpr std::size_t kCameraFrameBytes = 1 + 8 + 4 + 1;
-  const std::size_t n = in.count(kKeyframeBytes + map.rig().size() * kCameraFrameBytes);
-  std::size_t words_end = 0;
-  std::vector<KeyframeId> parents;
-  for (std::size_t i = 0; i < n && in.ok(); ++i) {
-    in.enter("keyframe", i);
-    const SE3 T_rig_world = take_transform(in);
-    const auto parent = in.number<std::int32_t>();
-    in.require(parent == -1 || in_range(parent, n), "a parent that does not exist", "a keyframe, or -1");
-    auto frame = take_frame(in, map.rig(), map.pyramid(), with_words, words_end);
-    in.leave();
-    if (!in.ok()) return 0;
-    map.add_keyframe(std::make_shared<const frame::BundledFrame>(std::move(frame)), T_rig_world, {}, {});
-    parents.emplace_back(parent);
-  }
-  if (!in.finish()) return 0;
-  in.require(map::attach_keyframes(map, KeyframeId(0), parents), "cyclic parents", "trees");
-  return words_end;
-}
-
-void put_landmarks(const map::BundledMap& map, const FileIds& ids, ByteWriter& out) {
-  out.count(map.num_landmarks());
-  for (const LandmarkId l : map.landmark_ids()) {
-    const map::Landmark& landmark = map.landmark(l);
-    out.numbers(landmark.position.data(), 3);
-    out.number(ids.keyframe[landmark.reference.keyframe.index()].value());
-    out.number(static_cast<std::uint16_t>(landmark.reference.keypoint.camera.value()));
-    out.number(landmark.reference.keypoint.keypoint.value());
-    out.number(ids.nearest_older(landmark.born).value());
-    out.number(landmark.expected);
-    out.number(landmark.found);
-    const auto observations = map.observations(l);
-    out.count(observations.size());
-    for (const map::Observation& o : observations) {
-      out.number(ids.keyframe[o.keyframe.index()].value());
-      out.number(o.feature.value());
-      out.number(static_cast<std::uint8_t>(o.aligned));
-    }
-  }
-}
-
-void take_landmarks(SectionReader& in, map::BundledMap& map) {
-  const std::size_t n = in.count(kLandmarkBytes);
-  for (std::size_t i = 0; i < n && in.ok(); ++i) {
-    in.enter("landmark", i);
-    take_landmark(in, map);
-    in.leave();
-  }
-  in.finish();
 }
 
 }  // namespace bslam::storage

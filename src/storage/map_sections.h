@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "base/thread_pool.h"
 #include "camera/rig.h"
 #include "map/bundled_map.h"
 #include "storage/map_bytes.h"
@@ -44,12 +45,46 @@ struct InfoSection {
   map::Scale scale = map::Scale::kMetric;
   MapFileInfo info;
 };
-InfoSection take_info(SectionReader& in);
+InfoSection take_info(SectionReader& in, std::uint32_t version);
 
-// Adds the keyframes with their spanning trees to an empty map. Returns one more than the highest word id.
-std::size_t take_keyframes(SectionReader& in, bool with_words, map::BundledMap& map);
+// The keyframes of a map.
+struct KeyframeSection {
+  std::vector<std::shared_ptr<const frame::BundledFrame>> frames;
+  std::vector<geometry::SE3> T_rig_world;
+  std::vector<KeyframeId> parents;
+  std::size_t words_end = 0;  // one more than the highest word id
+};
+// Of a map with the rig and pyramid of `map`.
+KeyframeSection take_keyframes(SectionReader& in, bool with_words, const map::BundledMap& map, ThreadPool& pool);
 
-void take_landmarks(SectionReader& in, map::BundledMap& map);
+// The landmarks of a map, one array for each of their properties.
+struct LandmarkSection {
+  SharedArray<Eigen::Vector3d> position, view_direction;  // the latter only since version 5, as the next two
+  SharedArray<feature::Descriptor> descriptor;
+  SharedArray<Eigen::Vector2f> distances;  // smallest and largest
+  SharedArray<KeyframeId> reference, born;
+  SharedArray<frame::KeypointRef> keypoint;  // of the reference
+  SharedArray<std::uint32_t> expected, found;
+  SharedArray<std::uint32_t> counts;  // of observations
+  SharedArray<KeyframeId> observing;  // the keyframes of all observations, landmark by landmark
+  SharedArray<FeatureId> features;    // and their features
+  SharedArray<std::uint8_t> aligned;
+
+  map::Landmark landmark(std::size_t i) const;
+};
+LandmarkSection take_landmarks(SectionReader& in);
+
+// In map_version_4.cc: the same of files before version 5.
+KeyframeSection take_keyframes_4(SectionReader& in, bool with_words, const map::BundledMap& map);
+LandmarkSection take_landmarks_4(SectionReader& in);
+frame::BundledFrame take_frame_4(SectionReader& in, const camera::Rig& rig, const feature::PyramidShape& pyramid,
+                                 bool with_words, std::size_t& words_end);
+
+// Checks that files of any version need. `state` and the time of the camera were read, or the keypoints, or the time
+// and the twist of the frame.
+bool check_image(SectionReader& in, std::uint32_t state, frame::CameraFrame& camera);
+bool check_keypoints(SectionReader& in, const feature::Keypoints& k, const camera::Camera& camera, int levels);
+bool check_frame(SectionReader& in, const frame::BundledFrame& frame);
 
 // Write and read the BundledFrame of a keyframe; implemented in map_frame_bytes.cc.
 void put_frame(const frame::BundledFrame& frame, const geometry::Vector6d& twist, bool with_words, ByteWriter& out);

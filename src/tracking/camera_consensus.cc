@@ -203,7 +203,7 @@ void remove_camera(const camera::Rig& rig, std::size_t camera, double min_parall
   frame::CameraFrame& out = frame.cameras[camera];
   out.state = image::ImageState::kMissing;
   out.keypoints = {};
-  out.words.clear();
+  out.words = {};
   out.grid = frame::FeatureGrid(out.keypoints, rig.camera(camera).width, rig.camera(camera).height);
   frame.bundled = matching::make_bundled(frame::rig_of(rig, frame), frame.cameras, matched, min_parallax, max_chi2);
 }

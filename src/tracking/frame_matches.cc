@@ -80,6 +80,8 @@ std::optional<matching::AlignedKeypoint> align_landmark(const map::BundledMap& m
   const map::LandmarkReference& reference = l.reference;
   const feature::Keypoints& keypoints = map.keypoints(reference.keyframe, reference.keypoint.camera);
   const std::size_t k = reference.keypoint.keypoint.index();
+  const feature::Patch* const patch = keypoints.patch.find(k);
+  if (patch == nullptr) return std::nullopt;
   const SE3 T_ref_world = map.cam_from_world(reference.keyframe, reference.keypoint.camera);
   // A smaller image has fewer levels than the image of the reference may have had.
   const std::size_t level = keypoints.level[k];
@@ -89,7 +91,7 @@ std::optional<matching::AlignedKeypoint> align_landmark(const map::BundledMap& m
   const auto warp = matching::patch_warp(map.rig().camera(reference.keypoint.camera), rig.camera(c), T_cam_ref,
                                          T_ref_world * l.position, scale);
   if (!warp) return std::nullopt;
-  return matching::align_patch(keypoints.patch[k], *warp, pyramid, initial, options);
+  return matching::align_patch(*patch, *warp, pyramid, initial, options);
 }
 
 AlignedMatches align_matches(const map::BundledMap& map, const frame::BundledFrame& frame, const SE3& T_rig_world,

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 
 #include "base/random.h"
 
@@ -116,6 +117,72 @@ TEST(BundledDeathTest, RejectsAKeypointInTwoFeatures) {
   const std::vector<std::vector<KeypointRef>> twice = {{a, b}, {a, c}}, same_camera = {{b, c}};
   EXPECT_DEATH(Bundled(counts, twice, std::vector<std::optional<BundledPoint>>(2)), "two features");
   EXPECT_DEATH(Bundled(counts, same_camera, std::vector<std::optional<BundledPoint>>(1)), "distinct cameras");
+}
+
+TEST(Bundled, IsMadeOfItsArraysAgain) {
+  Random random(3);
+  for (int round = 0; round < 100; ++round) {
+    const Sample sample = random_sample(random);
+    const Bundled bundled = sample.bundled();
+    const auto again = Bundled::from_arrays(sample.counts, bundled.num_matched(), bundled.arrays(), sample.points);
+    ASSERT_TRUE(again.has_value());
+    ASSERT_EQ(again->size(), bundled.size());
+    for (std::size_t f = 0; f < bundled.size(); ++f) {
+      const auto a = bundled.keypoints(FeatureId(f)), b = again->keypoints(FeatureId(f));
+      ASSERT_TRUE(std::equal(a.begin(), a.end(), b.begin(), b.end()));
+      for (const KeypointRef r : a) ASSERT_EQ(again->feature(r), FeatureId(f));
+      ASSERT_EQ(again->point(FeatureId(f)).has_value(), bundled.point(FeatureId(f)).has_value());
+    }
+  }
+}
+
+// Any change of one number in the arrays is found.
+TEST(Bundled, IsNotMadeOfArraysThatContradictEachOther) {
+  Random random(4);
+  int tried = 0;
+  for (int round = 0; round < 400; ++round) {
+    const Sample sample = random_sample(random);
+    const Bundled bundled = sample.bundled();
+    if (bundled.size() == 0) continue;
+    std::vector<KeypointRef> refs = bundled.arrays().refs.copy();
+    std::vector<std::uint32_t> begin = bundled.arrays().begin.copy();
+    std::vector<FeatureId> feature = bundled.arrays().feature.copy();
+    std::size_t matched = bundled.num_matched();
+    const auto any = [&](std::size_t n) { return random.below(static_cast<std::uint32_t>(n)); };
+    const std::int32_t wild = std::array{-1, 0, 3, 70, 0x7fffffff}[random.below(5)];
+    const auto change = [&](auto& id) {
+      id = std::remove_reference_t<decltype(id)>(id.value() == wild ? std::int32_t{1234567} : wild);
+    };
+    switch (random.below(5)) {
+      case 0:
+        change(refs[any(refs.size())].camera);
+        break;
+      case 1:
+        change(refs[any(refs.size())].keypoint);
+        break;
+      case 2:
+        change(feature[any(feature.size())]);
+        break;
+      case 3:
+        begin[any(begin.size())] += static_cast<std::uint32_t>(1 + random.below(3));
+        break;
+      default:
+        ++matched;
+    }
+    const Bundled::Arrays arrays{std::move(refs), std::move(begin), std::move(feature)};
+    EXPECT_FALSE(Bundled::from_arrays(sample.counts, matched, arrays, {}).has_value()) << round;
+    ++tried;
+  }
+  EXPECT_GT(tried, 300);
+}
+
+TEST(Bundled, CanLoseItsPoints) {
+  Random random(5);
+  const Bundled bundled = random_sample(random).bundled();
+  ASSERT_TRUE(bundled.has_points());
+  const Bundled without = bundled.without_points();
+  EXPECT_EQ(without.arrays().refs.data(), bundled.arrays().refs.data());
+  for (std::size_t f = 0; f < without.size(); ++f) EXPECT_FALSE(without.point(FeatureId(f)).has_value());
 }
 
 }  // namespace

@@ -171,7 +171,7 @@ TEST_F(Bundle, MovesOnlyKeypointsOfMatchedFeatures) {
     EXPECT_EQ(before.pixel.copy(), detected[c].pixel);
     EXPECT_EQ(before.sigma.copy(), detected[c].sigma);
     EXPECT_EQ(before.descriptor.data(), after.descriptor.data());  // shared, not copied
-    EXPECT_EQ(before.patch.data(), after.patch.data());
+    EXPECT_EQ(before.patch.patches().data(), after.patch.patches().data());
     for (std::size_t k = 0; k < after.size(); ++k) {
       const bool same = after.pixel[k] == before.pixel[k] && after.sigma[k] == before.sigma[k] &&
                         after.bearing[k] == before.bearing[k];

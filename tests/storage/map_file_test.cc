@@ -5,6 +5,7 @@
 #include "map/rigs_of_map.h"
 #include "storage/map_sections.h"
 #include "storage/small_map.h"
+#include "storage/version_4_bytes.h"
 #include "support/data_on_disk.h"
 #include "synthetic/rigs.h"
 
@@ -16,6 +17,7 @@ namespace fs = std::filesystem;
 SavedMap read_back(const map::BundledMap& map, const MapFileInfo& info = small_info()) {
   auto saved = map_from_bytes(map_to_bytes(map, info), "test");
   EXPECT_TRUE(saved) << saved.error().message();
+  EXPECT_EQ(saved->map.check_invariants(), std::nullopt);
   return *std::move(saved);
 }
 
@@ -39,7 +41,7 @@ void expect_same_frame(const frame::BundledFrame& a, const frame::BundledFrame& 
     EXPECT_EQ(ka.bearing, kb.bearing);
     EXPECT_EQ(ka.descriptor, kb.descriptor);
     EXPECT_EQ(ka.patch, kb.patch);
-    EXPECT_EQ(with_words ? a.cameras[c].words : std::vector<WordId>(), b.cameras[c].words);
+    EXPECT_EQ(with_words ? a.cameras[c].words : SharedArray<WordId>(), b.cameras[c].words);
     std::vector<std::uint32_t> near_a, near_b;
     a.cameras[c].grid.near(ka, {300, 200}, 150, 0, 7, near_a);
     b.cameras[c].grid.near(kb, {300, 200}, 150, 0, 7, near_b);
@@ -124,6 +126,57 @@ TEST(MapFile, RoundTripsTheMapBitwise) {
     EXPECT_EQ(saved.info.data, "a recording");
     EXPECT_EQ(saved.words_end, words_end(map));
   }
+}
+
+TEST(MapFile, ReadsKeyframesAndLandmarksOfVersion4) {
+  for (const camera::Rig& rig : {synthetic::default_rig(), synthetic::mixed_rig(), synthetic::ring_rig(1)}) {
+    const map::BundledMap map = small_map(rig);
+    for (const MapFileInfo& info : {small_info(), MapFileInfo{0, "0.1.0", ""}}) {
+      const auto saved = map_from_bytes(version_4_bytes(map, info), "old");
+      ASSERT_TRUE(saved) << saved.error().message();
+      EXPECT_EQ(saved->map.check_invariants(), std::nullopt);
+      expect_same_map(map, saved->map, info.vocabulary != 0);
+      EXPECT_EQ(map_to_bytes(saved->map, info), map_to_bytes(map, info));
+    }
+  }
+}
+
+// Keyframes that are no longer new have some patches, and no points of features.
+TEST(MapFile, RoundTripsKeyframesWithoutWhatTheyDoNotNeed) {
+  map::BundledMap map = small_map(synthetic::default_rig());
+  Random random(4, "empty keyframes");
+  for (std::size_t i = 0; i < map::BundledMap::kNewKeyframes; ++i) {
+    auto frame = std::make_shared<frame::BundledFrame>();
+    frame->cameras.resize(map.rig().size());
+    map.add_keyframe(std::move(frame), {}, {}, map.newest_keyframe());
+  }
+  const std::size_t whole = map_to_bytes(map, small_info()).size();
+  map.release_unused(1000);
+  ASSERT_FALSE(map.keypoints(KeyframeId(0), CameraIndex(0)).patch.complete());
+  const SavedMap saved = read_back(map);
+  expect_same_map(map, saved.map);
+  const std::string bytes = map_to_bytes(saved.map, saved.info);
+  EXPECT_EQ(bytes, map_to_bytes(map, small_info()));
+  EXPECT_LT(bytes.size(), whole);
+}
+
+// A file that is large enough is mapped: its arrays are used where they are.
+TEST(MapFile, UsesTheArraysOfALargeFileWhereTheyAre) {
+  const support::TemporaryFolder folder;
+  const fs::path file = folder.path() / "large.map";
+  map::BundledMap map = small_map(synthetic::ring_rig(2), {.max_keypoints = 300});
+  const KeyframeId first = map.keyframe_ids().front();
+  while (map.num_keyframes() < 900) map.add_keyframe(map.keyframe(first).frame, {}, {}, map.newest_keyframe());
+  ASSERT_TRUE(write_map(map, small_info(), file));
+  ASSERT_GT(fs::file_size(file), std::size_t{64} << 20);
+  const auto saved = read_map(file);
+  ASSERT_TRUE(saved) << saved.error().message();
+  ASSERT_TRUE(write_map(small_map(synthetic::ring_rig(1)), small_info(), file));  // replaces the file, not its bytes
+  EXPECT_EQ(saved->map.check_invariants(), std::nullopt);
+  MemoryCount whole, mapped;
+  EXPECT_LT(10 * saved->map.memory(mapped).descriptors, map.memory(whole).descriptors + 1);
+  const KeyframeId last = saved->map.newest_keyframe();
+  expect_same_frame(*map.keyframe(map.newest_keyframe()).frame, *saved->map.keyframe(last).frame, true);
 }
 
 camera::Rig changed(const camera::Rig& rig, std::size_t i, const std::function<void(camera::RigCamera&)>& change) {

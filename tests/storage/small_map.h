@@ -21,9 +21,10 @@ struct SmallMapOptions {
 // Adds words to all keypoints; they belong to no vocabulary.
 inline std::shared_ptr<const frame::BundledFrame> with_words(frame::BundledFrame frame) {
   for (frame::CameraFrame& c : frame.cameras) {
-    for (std::size_t k = 0; k < c.keypoints.size(); ++k) {
-      c.words.emplace_back(static_cast<std::int32_t>(c.keypoints.descriptor[k][0] % 1000));
-    }
+    std::vector<WordId> words;
+    for (const feature::Descriptor& d : c.keypoints.descriptor)
+      words.emplace_back(static_cast<std::int32_t>(d[0] % 1000));
+    c.words = std::move(words);
   }
   return std::make_shared<const frame::BundledFrame>(std::move(frame));
 }
