@@ -2,11 +2,17 @@
 
 #include <algorithm>
 #include <limits>
+#include <thread>
 
 #include "base/memory_count.h"
+#include "base/thread_pool.h"
 
 namespace bslam::looping {
 namespace {
+
+// An index of a loaded map is made by several threads.
+constexpr std::size_t kManyKeyframes = 256;
+constexpr int kMaxThreads = 8;
 
 struct Scored {
   KeyframeId keyframe;
@@ -75,17 +81,29 @@ BagOfWordsRecogniser::Words BagOfWordsRecogniser::words_of(const frame::BundledF
   return std::make_shared<const place::WordVector>(*vocabulary_, words);
 }
 
-// Updates the index to hold exactly the keyframes of `map`, regardless of which maps were used before.
+// Updates the index to hold exactly the keyframes of `map`, regardless of which maps were used before. This is done
+// before each query, so that a keyframe that has not changed must cost next to nothing.
 void BagOfWordsRecogniser::sync(const map::BundledMap& map) {
   known_.resize(std::max(known_.size(), map.keyframe_slots()));
+  std::vector<place::InvertedIndex::Entry> entries;
   for (std::size_t i = 0; i < known_.size(); ++i) {
     const KeyframeId k(i);
-    const auto frame = map.alive(k) ? map.keyframe(k).frame : nullptr;
-    if (frame && frame == known_[i].lock()) continue;
-    index_.remove(k);
-    if (frame) index_.add(k, words_of(*frame));
-    known_[i] = frame;
+    if (!map.alive(k)) {
+      index_.remove(k);
+      known_[i].reset();
+    } else if (const auto& frame = map.keyframe(k).frame;
+               known_[i].owner_before(frame) || frame.owner_before(known_[i])) {
+      index_.remove(k);
+      known_[i] = frame;
+      entries.push_back({k, nullptr});
+    }
   }
+  const bool many = entries.size() >= kManyKeyframes;
+  ThreadPool pool(many ? std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, kMaxThreads) : 1);
+  pool.for_each(entries.size(),
+                [&](std::size_t i) { entries[i].words = words_of(*map.keyframe(entries[i].keyframe).frame); });
+  index_.add(entries);
+  if (many) map.release_pages();
 }
 
 std::vector<Candidate> BagOfWordsRecogniser::query_keyframe(const map::BundledMap& map, KeyframeId keyframe) {
@@ -123,8 +141,7 @@ std::vector<Candidate> BagOfWordsRecogniser::rank(const map::BundledMap& map, co
   std::vector<Scored> scored;
   for (const place::CommonWords& c : sharing) {
     if (c.count < bounds.min_common_word_ratio * most) continue;
-    const double score = place::l1_score(words, *index_.words_of(c.keyframe));
-    if (score >= bounds.min_score) scored.push_back({c.keyframe, score});
+    if (c.score >= bounds.min_score) scored.push_back({c.keyframe, c.score});
   }
   std::vector<Candidate> groups;
   for (const Scored& s : scored)
