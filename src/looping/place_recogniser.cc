@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <span>
 #include <thread>
 
 #include "base/memory_count.h"
@@ -23,19 +24,18 @@ bool better(const Candidate& a, const Candidate& b) {
   return a.score != b.score ? a.score > b.score : a.keyframe < b.keyframe;
 }
 
-// Adds the scores of the best covisible keyframes of `at` that are in `scored` (sorted by id) and share at least
-// `weight` landmarks with it. The group is represented by its highest-scoring keyframe.
-Candidate group_of(const map::BundledMap& map, const Scored& at, const std::vector<Scored>& scored, int size,
-                   int weight) {
+// Adds the scores of the best covisible keyframes of `at` that have one and share at least `weight` landmarks with it.
+// `scores`: by keyframe, negative for those without. The group is represented by its highest-scoring keyframe.
+Candidate group_of(const map::BundledMap& map, const Scored& at, std::span<const double> scores, int size, int weight) {
   Candidate group{at.keyframe, at.score};
   double best = at.score;
   for (const map::Covisible& c : map.best_covisible(at.keyframe, static_cast<std::size_t>(size), weight)) {
-    const auto entry = std::ranges::lower_bound(scored, c.keyframe, {}, &Scored::keyframe);
-    if (entry == scored.end() || entry->keyframe != c.keyframe) continue;
-    group.score += entry->score;
-    if (entry->score > best) {
-      best = entry->score;
-      group.keyframe = entry->keyframe;
+    const double score = scores[c.keyframe.index()];
+    if (score < 0) continue;
+    group.score += score;
+    if (score > best) {
+      best = score;
+      group.keyframe = c.keyframe;
     }
   }
   return group;
@@ -139,13 +139,16 @@ std::vector<Candidate> BagOfWordsRecogniser::rank(const map::BundledMap& map, co
   int most = 0;
   for (const place::CommonWords& c : sharing) most = std::max(most, c.count);
   std::vector<Scored> scored;
+  std::vector<double> scores(map.keyframe_slots(), -1.0);
   for (const place::CommonWords& c : sharing) {
     if (c.count < bounds.min_common_word_ratio * most) continue;
-    if (c.score >= bounds.min_score) scored.push_back({c.keyframe, c.score});
+    if (c.score < bounds.min_score) continue;
+    scored.push_back({c.keyframe, c.score});
+    scores[c.keyframe.index()] = c.score;
   }
   std::vector<Candidate> groups;
   for (const Scored& s : scored)
-    groups.push_back(group_of(map, s, scored, options_.group, options_.min_neighbour_landmarks));
+    groups.push_back(group_of(map, s, scores, options_.group, options_.min_neighbour_landmarks));
   std::sort(groups.begin(), groups.end(), better);
   std::vector<Candidate> out;
   // A group covers its representative and the neighbours of the representative. Keyframes that share only a few
