@@ -10,7 +10,7 @@
 #include "base/memory_count.h"
 #include "base/random.h"
 #include "looping/place_recogniser.h"
-#include "looping/verify_place.h"
+#include "looping/relocalise.h"
 #include "map/append_map.h"
 #include "session/process_use.h"
 #include "storage/map_file.h"
@@ -22,9 +22,16 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-double ms_since(Clock::time_point start) {
-  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-}
+// Time of the clock, and processor time of all threads, since its construction.
+class Timer {
+ public:
+  double ms() const { return std::chrono::duration<double, std::milli>(Clock::now() - start_).count(); }
+  double cpu_ms() const { return 1000 * (session::cpu_seconds().value_or(0) - cpu_); }
+
+ private:
+  Clock::time_point start_ = Clock::now();
+  double cpu_ = session::cpu_seconds().value_or(0);
+};
 
 // A frame of another place that looks about as different as two places of one town: some bits of all descriptors
 // differ.
@@ -72,7 +79,7 @@ map::BundledMap copy_of(const map::BundledMap& source, double shift, int bits, c
 
 struct Arguments {
   std::string map, out;
-  int copies = 8, bits = 40, queries = 200;
+  int copies = 8, bits = 30, queries = 200;
 };
 
 Status make(const Arguments& a) {
@@ -81,62 +88,98 @@ Status make(const Arguments& a) {
   const auto vocabulary = storage::vocabulary_or_shipped("");
   if (!vocabulary) return vocabulary.error();
   Random random(1, "large map");
-  map::BundledMap all = saved->map;
+  map::BundledMap all(saved->map.shared_rig(), saved->map.pyramid());
+  all.set_scale(saved->map.scale());
+  map::append_map(all, saved->map);
   for (int i = 1; i < a.copies; ++i)
     map::append_map(all, copy_of(saved->map, 2000.0 * i, a.bits, **vocabulary, random));
+  all.release_unused(all.keyframe_slots());  // as a run does while it goes on
   const Status written = storage::write_map(all, saved->info, a.out);
   fmt::print("{} keyframes, {} landmarks\n", all.num_keyframes(), all.num_landmarks());
   return written;
 }
 
-void print(const char* name, std::vector<double> ms) {
-  if (ms.empty()) return;
-  std::sort(ms.begin(), ms.end());
-  const auto at = [&](double q) { return ms[static_cast<std::size_t>(q * static_cast<double>(ms.size() - 1))]; };
-  fmt::print("{}: {:.2f} ms, 95 % {:.2f} ms, at most {:.2f} ms\n", name, at(0.5), at(0.95), ms.back());
-}
+class Series {
+ public:
+  explicit Series(const char* name) : name_(name) {}
+  void add(const Timer& timer) {
+    ms_.push_back(timer.ms());
+    cpu_ms_.push_back(timer.cpu_ms());
+  }
+  void print() {
+    if (ms_.empty()) return;
+    fmt::print("{}: {:.2f} ms, 95 % {:.2f} ms; processor {:.2f} ms, 95 % {:.2f} ms\n", name_, at(ms_, 0.5),
+               at(ms_, 0.95), at(cpu_ms_, 0.5), at(cpu_ms_, 0.95));
+  }
+
+ private:
+  static double at(std::vector<double>& values, double q) {
+    std::sort(values.begin(), values.end());
+    return values[static_cast<std::size_t>(q * static_cast<double>(values.size() - 1))];
+  }
+  const char* name_;
+  std::vector<double> ms_, cpu_ms_;
+};
 
 void print_memory(const char* when) {
   fmt::print("memory {}: {:.0f} MB, at most {:.0f} MB\n", when, session::resident_memory_mb().value_or(0),
              session::peak_memory_mb().value_or(0));
 }
 
+// Frames that look like a keyframe of the map, but for some bits.
+void measure_queries(const map::BundledMap& map, looping::PlaceRecogniser& places, const place::Vocabulary& vocabulary,
+                     const system::Config& config, const Arguments& a) {
+  Random random(2, "queries");
+  Series of_frame("query of a frame"), of_keyframe("query of a keyframe"), localised("localisation by features");
+  std::size_t candidates = 0, first = 0, found = 0;
+  for (int i = 0; i < a.queries; ++i) {
+    const KeyframeId k(std::size_t{random.below(static_cast<std::uint32_t>(map.keyframe_slots()))});
+    const auto frame = changed(*map.keyframe(k).frame, a.bits, vocabulary, random);
+    const Timer query;
+    const auto ranked = places.query_frame(map, *frame);
+    of_frame.add(query);
+    candidates += ranked.size();
+    first += !ranked.empty() && ranked.front().keyframe == k;
+    const Timer query_keyframe;
+    places.query_keyframe(map, k);
+    of_keyframe.add(query_keyframe);
+    const Timer localisation;
+    const auto place =
+        looping::relocalise(places, map, *frame, config.looping.verification, config.feature_model(), random);
+    localised.add(localisation);
+    found += place && (place->T_rig_world * map.keyframe(k).T_rig_world.inverse()).translation().norm() < 0.5;
+  }
+  of_frame.print();
+  of_keyframe.print();
+  localised.print();
+  fmt::print("of {}: {} candidates, the first is the keyframe {} times; {} localised within 0.5 m\n", a.queries,
+             candidates, first, found);
+}
+
 Status measure(const Arguments& a) {
-  Clock::time_point start = Clock::now();
+  const Timer loading;
   const auto saved = storage::read_map(a.map);
   if (!saved) return saved.error();
-  fmt::print("load: {:.0f} ms; {} keyframes, {} landmarks\n", ms_since(start), saved->map.num_keyframes(),
-             saved->map.num_landmarks());
+  const map::BundledMap& map = saved->map;
+  fmt::print("load: {:.0f} ms, processor {:.0f} ms; {} keyframes, {} landmarks\n", loading.ms(), loading.cpu_ms(),
+             map.num_keyframes(), map.num_landmarks());
   print_memory("after loading");
   MemoryCount count;
-  fmt::print("map in memory of its own: {:.0f} MB\n",
-             static_cast<double>(saved->map.memory(count).total()) / (1 << 20));
+  const map::MapMemory memory = map.memory(count);
+  fmt::print(
+      "of its own: {} MB; keyframes {}, features {}, patches {}, landmarks {}, observations {}, covisibility {}\n",
+      memory.total() >> 20, memory.keyframes >> 20, memory.features >> 20, memory.patches >> 20, memory.landmarks >> 20,
+      memory.observations >> 20, memory.covisibility >> 20);
   const auto vocabulary = storage::vocabulary_or_shipped("");
   if (!vocabulary) return vocabulary.error();
   const system::Config config;
   looping::BagOfWordsRecogniser places(*vocabulary, config.looping.recognition);
-  start = Clock::now();
-  places.query_frame(saved->map, frame::BundledFrame());
-  fmt::print("index of places: {:.0f} ms, {:.0f} MB\n", ms_since(start),
-             static_cast<double>(places.memory_bytes()) / (1 << 20));
+  const Timer indexing;
+  places.query_frame(map, frame::BundledFrame());
+  fmt::print("index of places: {:.0f} ms, processor {:.0f} ms, {} MB\n", indexing.ms(), indexing.cpu_ms(),
+             places.memory_bytes() >> 20);
   print_memory("with the index");
-  Random random(2, "queries");
-  std::vector<double> frames, keyframes;
-  std::size_t candidates = 0, found = 0;
-  for (int i = 0; i < a.queries; ++i) {
-    const KeyframeId k(std::size_t{random.below(static_cast<std::uint32_t>(saved->map.keyframe_slots()))});
-    start = Clock::now();
-    const auto of_frame = places.query_frame(saved->map, *saved->map.keyframe(k).frame);
-    frames.push_back(ms_since(start));
-    candidates += of_frame.size();
-    for (const auto& c : of_frame) found += c.keyframe == k;
-    start = Clock::now();
-    places.query_keyframe(saved->map, k);
-    keyframes.push_back(ms_since(start));
-  }
-  print("query of a frame", frames);
-  print("query of a keyframe", keyframes);
-  fmt::print("{} candidates, of which {} are the keyframe itself\n", candidates, found);
+  measure_queries(map, places, **vocabulary, config, a);
   print_memory("after the queries");
   return {};
 }
@@ -155,6 +198,7 @@ int main(int argc, char** argv) {
   make->add_option("--bits", a.bits, "bits of each descriptor that are changed in each copy")->capture_default_str();
   CLI::App* const measure = app.add_subcommand("measure", "measures loading, memory and recognition of places");
   measure->add_option("map", a.map, "a saved map")->required();
+  measure->add_option("--bits", a.bits, "bits of each descriptor of a query that are changed")->capture_default_str();
   measure->add_option("--queries", a.queries, "number of places that are queried")->capture_default_str();
   CLI11_PARSE(app, argc, argv);
   const bslam::Status status = *make ? bslam::make(a) : bslam::measure(a);

@@ -4,6 +4,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <system_error>
 #include <utility>
@@ -77,12 +78,16 @@ Status check_writable(const std::filesystem::path& path) {
 }
 
 Status write_atomically(const std::filesystem::path& path, std::string_view bytes) {
+  return write_atomically(path, std::span(&bytes, 1));
+}
+
+Status write_atomically(const std::filesystem::path& path, std::span<const std::string_view> pieces) {
   if (Status replaceable = check_replaceable(path); !replaceable) return replaceable;
   std::filesystem::path part;
   Descriptor file(open_beside(path, part));
   if (file.get() < 0) return system_error("write", path, kWritable);
-  const bool written = write_all(file.get(), bytes) && ::fsync(file.get()) == 0 && file.close() &&
-                       ::rename(part.c_str(), path.c_str()) == 0;
+  const bool written = std::ranges::all_of(pieces, [&](std::string_view p) { return write_all(file.get(), p); }) &&
+                       ::fsync(file.get()) == 0 && file.close() && ::rename(part.c_str(), path.c_str()) == 0;
   if (!written) {
     const Error error = system_error("write", path, kWritable);
     ::unlink(part.c_str());

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -14,6 +15,8 @@ namespace bslam {
 // exist. An existing regular file is replaced; a device, for example, is an error. On error the temporary file is
 // removed and an existing file is unchanged.
 Status write_atomically(const std::filesystem::path& path, std::string_view bytes);
+// Writes these pieces one after the other.
+Status write_atomically(const std::filesystem::path& path, std::span<const std::string_view> pieces);
 
 // Checks whether write_atomically could write a file of this name, by creating and removing a temporary file in its
 // folder. Errors: the folder does not exist or is not writable; the name belongs to something other than a regular

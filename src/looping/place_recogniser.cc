@@ -2,11 +2,18 @@
 
 #include <algorithm>
 #include <limits>
+#include <span>
+#include <thread>
 
 #include "base/memory_count.h"
+#include "base/thread_pool.h"
 
 namespace bslam::looping {
 namespace {
+
+// An index of a loaded map is made by several threads.
+constexpr std::size_t kManyKeyframes = 256;
+constexpr int kMaxThreads = 8;
 
 struct Scored {
   KeyframeId keyframe;
@@ -17,19 +24,18 @@ bool better(const Candidate& a, const Candidate& b) {
   return a.score != b.score ? a.score > b.score : a.keyframe < b.keyframe;
 }
 
-// Adds the scores of the best covisible keyframes of `at` that are in `scored` (sorted by id) and share at least
-// `weight` landmarks with it. The group is represented by its highest-scoring keyframe.
-Candidate group_of(const map::BundledMap& map, const Scored& at, const std::vector<Scored>& scored, int size,
-                   int weight) {
+// Adds the scores of the best covisible keyframes of `at` that have one and share at least `weight` landmarks with it.
+// `scores`: by keyframe, negative for those without. The group is represented by its highest-scoring keyframe.
+Candidate group_of(const map::BundledMap& map, const Scored& at, std::span<const double> scores, int size, int weight) {
   Candidate group{at.keyframe, at.score};
   double best = at.score;
   for (const map::Covisible& c : map.best_covisible(at.keyframe, static_cast<std::size_t>(size), weight)) {
-    const auto entry = std::ranges::lower_bound(scored, c.keyframe, {}, &Scored::keyframe);
-    if (entry == scored.end() || entry->keyframe != c.keyframe) continue;
-    group.score += entry->score;
-    if (entry->score > best) {
-      best = entry->score;
-      group.keyframe = entry->keyframe;
+    const double score = scores[c.keyframe.index()];
+    if (score < 0) continue;
+    group.score += score;
+    if (score > best) {
+      best = score;
+      group.keyframe = c.keyframe;
     }
   }
   return group;
@@ -75,17 +81,29 @@ BagOfWordsRecogniser::Words BagOfWordsRecogniser::words_of(const frame::BundledF
   return std::make_shared<const place::WordVector>(*vocabulary_, words);
 }
 
-// Updates the index to hold exactly the keyframes of `map`, regardless of which maps were used before.
+// Updates the index to hold exactly the keyframes of `map`, regardless of which maps were used before. This is done
+// before each query, so that a keyframe that has not changed must cost next to nothing.
 void BagOfWordsRecogniser::sync(const map::BundledMap& map) {
   known_.resize(std::max(known_.size(), map.keyframe_slots()));
+  std::vector<place::InvertedIndex::Entry> entries;
   for (std::size_t i = 0; i < known_.size(); ++i) {
     const KeyframeId k(i);
-    const auto frame = map.alive(k) ? map.keyframe(k).frame : nullptr;
-    if (frame && frame == known_[i].lock()) continue;
-    index_.remove(k);
-    if (frame) index_.add(k, words_of(*frame));
-    known_[i] = frame;
+    if (!map.alive(k)) {
+      index_.remove(k);
+      known_[i].reset();
+    } else if (const auto& frame = map.keyframe(k).frame;
+               known_[i].owner_before(frame) || frame.owner_before(known_[i])) {
+      index_.remove(k);
+      known_[i] = frame;
+      entries.push_back({k, nullptr});
+    }
   }
+  const bool many = entries.size() >= kManyKeyframes;
+  ThreadPool pool(many ? std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, kMaxThreads) : 1);
+  pool.for_each(entries.size(),
+                [&](std::size_t i) { entries[i].words = words_of(*map.keyframe(entries[i].keyframe).frame); });
+  index_.add(entries);
+  if (many) map.release_pages();
 }
 
 std::vector<Candidate> BagOfWordsRecogniser::query_keyframe(const map::BundledMap& map, KeyframeId keyframe) {
@@ -121,14 +139,16 @@ std::vector<Candidate> BagOfWordsRecogniser::rank(const map::BundledMap& map, co
   int most = 0;
   for (const place::CommonWords& c : sharing) most = std::max(most, c.count);
   std::vector<Scored> scored;
+  std::vector<double> scores(map.keyframe_slots(), -1.0);
   for (const place::CommonWords& c : sharing) {
     if (c.count < bounds.min_common_word_ratio * most) continue;
-    const double score = place::l1_score(words, *index_.words_of(c.keyframe));
-    if (score >= bounds.min_score) scored.push_back({c.keyframe, score});
+    if (c.score < bounds.min_score) continue;
+    scored.push_back({c.keyframe, c.score});
+    scores[c.keyframe.index()] = c.score;
   }
   std::vector<Candidate> groups;
   for (const Scored& s : scored)
-    groups.push_back(group_of(map, s, scored, options_.group, options_.min_neighbour_landmarks));
+    groups.push_back(group_of(map, s, scores, options_.group, options_.min_neighbour_landmarks));
   std::sort(groups.begin(), groups.end(), better);
   std::vector<Candidate> out;
   // A group covers its representative and the neighbours of the representative. Keyframes that share only a few

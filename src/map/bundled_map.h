@@ -23,6 +23,10 @@
 #include "map/landmark.h"
 #include "map/observation_column.h"
 
+namespace bslam {
+class MappedFile;
+}
+
 namespace bslam::map {
 
 // kMetric: lengths are in metres. kUpToScale: the rig cannot observe the scale. kUnobservable: the rig can observe the
@@ -225,6 +229,11 @@ class BundledMap {
   void release_unused(std::size_t count);
   static constexpr std::size_t kNewKeyframes = 64;
 
+  // Tells the system that what was read of the map's file is not needed soon, after all keyframes were visited. Does
+  // nothing if the arrays of no keyframe lie in a file.
+  void release_pages() const;
+  void set_file(std::shared_ptr<const MappedFile> file) { file_ = std::move(file); }
+
   // ---- In fill_map.cc
   // Fills an empty map. The viewing direction, distances and descriptor of the landmarks are taken as they are. Returns
   // what is wrong with the parts, if anything is; the map is unusable then. Otherwise it has all invariants.
@@ -276,6 +285,7 @@ class BundledMap {
   CowVector<LandmarkId, 64> merged_into_;
   ObservationColumn observations_;
   std::size_t alive_keyframes_ = 0, alive_landmarks_ = 0, observations_total_ = 0;
+  std::shared_ptr<const MappedFile> file_;
   std::size_t next_chunk_to_free_ = 0;        // next block of landmarks that free_removed visits
   std::size_t next_keyframe_to_release_ = 0;  // next keyframe that release_unused visits
 };

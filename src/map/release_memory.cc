@@ -1,6 +1,7 @@
 // Releases the memory of what a map does not need any more.
 #include <algorithm>
 
+#include "base/mapped_file.h"
 #include "map/bundled_map.h"
 
 namespace bslam::map {
@@ -17,6 +18,10 @@ void BundledMap::free_removed(std::size_t slots) {
     landmarks_.blank_chunk(group, owner_.tag());
     observations_.blank_block(group, owner_.tag());
   }
+}
+
+void BundledMap::release_pages() const {
+  if (file_) file_->release();
 }
 
 void BundledMap::release_unused(std::size_t count) {

@@ -21,6 +21,7 @@ WordVector::WordVector(const Vocabulary& vocabulary, std::span<const WordId> wor
     sum += weight > 0 ? weight : 0.0f;
     begin = end;
   }
+  words_.shrink_to_fit();  // it lives as long as its keyframe
   for (WeightedWord& w : words_) w.weight = static_cast<float>(w.weight / sum);
 }
 

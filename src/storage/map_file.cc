@@ -44,7 +44,7 @@ struct Sections {
   std::array<std::uint32_t, kTags.size()> checksums = {};
 };
 
-std::string header_of(const std::array<std::string, kTags.size()>& sections, ThreadPool& pool) {
+std::string header_of(std::span<const std::string, kTags.size()> sections, ThreadPool& pool) {
   std::size_t total = kHeaderBytes;
   for (const std::string& s : sections) total += s.size();
   ByteWriter out;
@@ -149,27 +149,32 @@ Result<SavedMap> build(const Sections& sections, std::string file, const std::sh
 
 }  // namespace
 
-std::string map_to_bytes(const map::BundledMap& map, const MapFileInfo& info) {
+namespace {
+
+// The header and the sections of a file.
+std::array<std::string, 1 + kTags.size()> pieces_of(const map::BundledMap& map, const MapFileInfo& info) {
   const FileIds ids(map);
   std::array<ByteWriter, kTags.size()> writers;
   put_rigs(map, writers[0]);
   put_info(map, info, writers[1]);
   put_keyframes(map, ids, info.vocabulary != 0, writers[2]);
   put_landmarks(map, ids, writers[3]);
-  std::array<std::string, kTags.size()> sections;
+  std::array<std::string, 1 + kTags.size()> pieces;
+  const std::span<std::string, kTags.size()> sections = std::span(pieces).last<kTags.size()>();
   for (std::size_t i = 0; i < kTags.size(); ++i) {
     writers[i].align();  // so that each section begins at a multiple of kAlignment
     sections[i] = std::move(writers[i]).take();
   }
   ThreadPool pool(threads_for(sections[2].size()));
-  std::string bytes = header_of(sections, pool);
-  std::size_t total = bytes.size();
-  for (const std::string& s : sections) total += s.size();
-  bytes.reserve(total);
-  for (std::string& s : sections) {
-    bytes += s;
-    s = {};  // freed before the next section is decompressed
-  }
+  pieces[0] = header_of(sections, pool);
+  return pieces;
+}
+
+}  // namespace
+
+std::string map_to_bytes(const map::BundledMap& map, const MapFileInfo& info) {
+  std::string bytes;
+  for (const std::string& piece : pieces_of(map, info)) bytes += piece;
   return bytes;
 }
 
@@ -201,7 +206,9 @@ Status write_map(const map::BundledMap& map, const MapFileInfo& info, const std:
     return Error{file.string(), "rig", std::to_string(map.rig().size()) + " cameras",
                  "at most " + std::to_string(kMaxCameras)};
   }
-  return write_atomically(file, map_to_bytes(map, info));
+  const auto pieces = pieces_of(map, info);
+  const std::vector<std::string_view> views(pieces.begin(), pieces.end());
+  return write_atomically(file, views);
 }
 
 Result<SavedMap> read_map(const std::filesystem::path& file) {
@@ -210,7 +217,9 @@ Result<SavedMap> read_map(const std::filesystem::path& file) {
     const auto mapped = MappedFile::open(file, kMaxMapBytes);
     if (!mapped) return mapped.error();
     auto saved = map_in(mapped->bytes(), file.string(), mapped->owner());
-    mapped->release();
+    if (!saved) return saved;
+    saved->map.set_file(std::make_shared<const MappedFile>(*mapped));
+    saved->map.release_pages();
     return saved;
   }
   auto bytes = read_file(file, kMaxMapBytes);

@@ -2,12 +2,21 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
 #include <set>
 
 #include "place/random_descriptors.h"
 
 namespace bslam::place {
 namespace {
+
+using Counts = std::vector<std::pair<KeyframeId, int>>;
+
+Counts counts(const std::vector<CommonWords>& result) {
+  Counts out;
+  for (const CommonWords& c : result) out.emplace_back(c.keyframe, c.count);
+  return out;
+}
 
 class InvertedIndexTest : public testing::Test {
  protected:
@@ -29,7 +38,7 @@ class InvertedIndexTest : public testing::Test {
       for (const WeightedWord& w : vector->words()) own.insert(w.word);
       int count = 0;
       for (const WeightedWord& w : words.words()) count += static_cast<int>(own.count(w.word));
-      if (count > 0) result.push_back({keyframe, count});
+      if (count > 0) result.push_back({keyframe, count, l1_score(words, *vector)});
     }
     return result;
   }
@@ -38,6 +47,27 @@ class InvertedIndexTest : public testing::Test {
   VocabularyPtr vocabulary_ = random_vocabulary(8, 3, random_);
   std::map<KeyframeId, std::shared_ptr<const WordVector>> held_;
 };
+
+TEST_F(InvertedIndexTest, SeveralKeyframesAddedAtOnceAreThoseAddedOneByOne) {
+  InvertedIndex index;
+  for (int id = 10; id < 60; id += 5) {
+    held_[KeyframeId(id)] = random_vector(20);
+    index.add(KeyframeId(id), held_[KeyframeId(id)]);
+  }
+  std::vector<InvertedIndex::Entry> entries;  // between, before and after those in the index; one has no words
+  for (int id = 1; id < 80; id += 3) {
+    if (index.contains(KeyframeId(id))) continue;
+    held_[KeyframeId(id)] = random_vector(id == 40 ? 0 : 20);
+    entries.push_back({KeyframeId(id), held_[KeyframeId(id)]});
+  }
+  index.add(entries);
+  EXPECT_EQ(index.size(), held_.size());
+  for (int n = 0; n < 50; ++n) {
+    const auto query = random_vector(20);
+    ASSERT_EQ(index.query(*query), query_by_definition(*query));
+  }
+  for (const InvertedIndex::Entry& e : entries) EXPECT_EQ(index.words_of(e.keyframe), e.words);
+}
 
 TEST_F(InvertedIndexTest, AgreesWithAnExhaustiveComparison) {
   InvertedIndex index;
@@ -73,11 +103,11 @@ TEST_F(InvertedIndexTest, DoesNotReturnRemovedKeyframes) {
   index.add(KeyframeId(3), vector_of({WordId(1), WordId(2)}));
   index.add(KeyframeId(5), vector_of({WordId(2), WordId(7)}));
   index.remove(KeyframeId(4));  // not in the index
-  EXPECT_EQ(index.query(*vector_of({WordId(2)})), (std::vector<CommonWords>{{KeyframeId(3), 1}, {KeyframeId(5), 1}}));
+  EXPECT_EQ(counts(index.query(*vector_of({WordId(2)}))), (Counts{{KeyframeId(3), 1}, {KeyframeId(5), 1}}));
   index.remove(KeyframeId(3));
   EXPECT_FALSE(index.contains(KeyframeId(3)));
   EXPECT_EQ(index.words_of(KeyframeId(3)), nullptr);
-  EXPECT_EQ(index.query(*vector_of({WordId(1), WordId(2), WordId(7)})), (std::vector<CommonWords>{{KeyframeId(5), 2}}));
+  EXPECT_EQ(counts(index.query(*vector_of({WordId(1), WordId(2), WordId(7)}))), (Counts{{KeyframeId(5), 2}}));
   index.remove(KeyframeId(5));
   EXPECT_EQ(index.size(), 0u);
   EXPECT_TRUE(index.query(*vector_of({WordId(2), WordId(7)})).empty());
