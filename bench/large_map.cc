@@ -3,16 +3,16 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
-#include <chrono>
 #include <string>
 
 #include "base/memory_count.h"
 #include "base/random.h"
+#include "base/stopwatch.h"
 #include "looping/place_recogniser.h"
 #include "looping/relocalise.h"
 #include "map/append_map.h"
 #include "session/process_use.h"
+#include "session/summary.h"
 #include "storage/map_file.h"
 #include "storage/vocabulary_file.h"
 #include "system/config.h"
@@ -20,16 +20,14 @@
 namespace bslam {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 // Time of the clock, and processor time of all threads, since its construction.
 class Timer {
  public:
-  double ms() const { return std::chrono::duration<double, std::milli>(Clock::now() - start_).count(); }
+  double ms() const { return watch_.ms(); }
   double cpu_ms() const { return 1000 * (session::cpu_seconds().value_or(0) - cpu_); }
 
  private:
-  Clock::time_point start_ = Clock::now();
+  Stopwatch watch_;
   double cpu_ = session::cpu_seconds().value_or(0);
 };
 
@@ -106,17 +104,13 @@ class Series {
     ms_.push_back(timer.ms());
     cpu_ms_.push_back(timer.cpu_ms());
   }
-  void print() {
-    if (ms_.empty()) return;
-    fmt::print("{}: {:.2f} ms, 95 % {:.2f} ms; processor {:.2f} ms, 95 % {:.2f} ms\n", name_, at(ms_, 0.5),
-               at(ms_, 0.95), at(cpu_ms_, 0.5), at(cpu_ms_, 0.95));
+  void print() const {
+    const auto clock = session::duration_statistics(ms_), processor = session::duration_statistics(cpu_ms_);
+    fmt::print("{}: {:.2f} ms, 95 % {:.2f} ms; processor {:.2f} ms, 95 % {:.2f} ms\n", name_, clock.median, clock.p95,
+               processor.median, processor.p95);
   }
 
  private:
-  static double at(std::vector<double>& values, double q) {
-    std::sort(values.begin(), values.end());
-    return values[static_cast<std::size_t>(q * static_cast<double>(values.size() - 1))];
-  }
   const char* name_;
   std::vector<double> ms_, cpu_ms_;
 };

@@ -6,37 +6,14 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <system_error>
 #include <utility>
+
+#include "base/file_descriptor.h"
 
 namespace bslam {
 namespace {
 
 constexpr const char* kWritable = "a file that can be written";
-
-// Owns a file descriptor; -1 if there is none.
-class Descriptor {
- public:
-  explicit Descriptor(int fd) : fd_(fd) {}
-  ~Descriptor() {
-    if (fd_ >= 0) ::close(fd_);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-
-  int get() const { return fd_; }
-  bool close() { return ::close(std::exchange(fd_, -1)) == 0; }
-
- private:
-  int fd_;
-};
-
-// Returns an error such as "cannot open FILE: No such file or directory", from errno.
-Error system_error(std::string_view attempt, const std::filesystem::path& path, std::string expected) {
-  const std::string reason = std::system_category().message(errno);
-  std::string sentence = "cannot " + std::string(attempt) + " " + path.string() + ": " + reason;
-  return {path.string(), "", reason, std::move(expected), std::move(sentence)};
-}
 
 bool write_all(int fd, std::string_view bytes) {
   while (!bytes.empty()) {
@@ -71,7 +48,7 @@ Status check_replaceable(const std::filesystem::path& path) {
 Status check_writable(const std::filesystem::path& path) {
   if (Status replaceable = check_replaceable(path); !replaceable) return replaceable;
   std::filesystem::path part;
-  const Descriptor file(open_beside(path, part));
+  const FileDescriptor file(open_beside(path, part));
   if (file.get() < 0) return system_error("write", path, kWritable);
   ::unlink(part.c_str());
   return {};
@@ -84,7 +61,7 @@ Status write_atomically(const std::filesystem::path& path, std::string_view byte
 Status write_atomically(const std::filesystem::path& path, std::span<const std::string_view> pieces) {
   if (Status replaceable = check_replaceable(path); !replaceable) return replaceable;
   std::filesystem::path part;
-  Descriptor file(open_beside(path, part));
+  FileDescriptor file(open_beside(path, part));
   if (file.get() < 0) return system_error("write", path, kWritable);
   const bool written = std::ranges::all_of(pieces, [&](std::string_view p) { return write_all(file.get(), p); }) &&
                        ::fsync(file.get()) == 0 && file.close() && ::rename(part.c_str(), path.c_str()) == 0;
@@ -95,31 +72,25 @@ Status write_atomically(const std::filesystem::path& path, std::span<const std::
   }
   // The new name is durable once the folder is flushed. A file system that cannot flush folders is not an error.
   const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
-  const Descriptor opened(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  const FileDescriptor opened(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (opened.get() >= 0) ::fsync(opened.get());
   return {};
 }
 
 Result<std::string> read_file(const std::filesystem::path& path, std::size_t max_bytes) {
-  // Non-blocking, so that a named pipe is rejected instead of blocking until another process writes to it.
-  const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
-  struct stat status {};
-  if (file.get() < 0 || ::fstat(file.get(), &status) != 0) return system_error("open", path, "a file that can be read");
-  if (!S_ISREG(status.st_mode))
-    return Error{path.string(), "", S_ISDIR(status.st_mode) ? "a folder" : "a device or pipe", "a file"};
-  const Error too_large{path.string(), "", "more than " + std::to_string(max_bytes) + " bytes", "a smaller file"};
-  if (static_cast<std::size_t>(status.st_size) > max_bytes) return too_large;
-  std::string bytes(static_cast<std::size_t>(status.st_size) + 1,
-                    '\0');  // one byte more, so that the end of the file is detected without growing the buffer
+  const auto file = open_regular_file(path, max_bytes);
+  if (!file) return file.error();
+  // One byte more, so that the end of the file is detected without growing the buffer.
+  std::string bytes(file->size + 1, '\0');
   std::size_t size = 0;
   for (;;) {
     if (size == bytes.size()) bytes.resize(2 * size);  // the file has grown since fstat
-    const ssize_t got = ::read(file.get(), bytes.data() + size, bytes.size() - size);
+    const ssize_t got = ::read(file->descriptor.get(), bytes.data() + size, bytes.size() - size);
     if (got < 0 && errno == EINTR) continue;
-    if (got < 0) return system_error("read", path, "a file that can be read");
+    if (got < 0) return system_error("read", path, kReadable);
     if (got == 0) break;
     size += static_cast<std::size_t>(got);
-    if (size > max_bytes) return too_large;
+    if (size > max_bytes) return too_large(path, max_bytes);
   }
   bytes.resize(size);
   return bytes;

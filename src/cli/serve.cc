@@ -9,9 +9,9 @@
 #include <optional>
 #include <stop_token>
 #include <string>
-#include <thread>
 #include <utility>
 
+#include "base/cores.h"
 #include "cli/config_arguments.h"
 #include "cli/interruption.h"
 #include "cli/verbs.h"
@@ -57,8 +57,6 @@ Result<ServedMap> read_served_map(const ServeArguments& a, const system::Config&
   return ServedMap{*std::move(own), *std::move(rig)};
 }
 
-int cores() { return std::max(1, static_cast<int>(std::thread::hardware_concurrency())); }
-
 map_service::MapSource source_of(const storage::SavedMap& saved) {
   map_service::MapSource source{.name = std::filesystem::path(saved.file).filename(),
                                 .data = saved.info.data,
@@ -88,7 +86,7 @@ map_service::ServiceOptions service_options(const ServeArguments& a) {
   map_service::ServiceOptions options;
   options.server.address = a.address;
   options.server.port = static_cast<std::uint16_t>(a.port);
-  options.workers = a.workers > 0 ? a.workers : cores();
+  options.workers = a.workers > 0 ? a.workers : processor_cores();
   options.queue = static_cast<std::size_t>(a.queue);
   options.max_request_bytes = static_cast<std::uint64_t>(a.max_request_mb) << 20;
   options.token = a.token;
@@ -113,7 +111,7 @@ int serve(const ServeArguments& a) {
   if (!masks) return report_error(masks.error());
 
   const map_service::ServiceOptions options = service_options(a);
-  if (config->execution.threads == 0) config->execution.threads = std::max(1, cores() / options.workers);
+  if (config->execution.threads == 0) config->execution.threads = std::max(1, processor_cores() / options.workers);
   const map_service::MapSource source = source_of(served->saved);
   const auto localiser = std::make_shared<const system::Localiser>(served->rig, *config, std::move(served->saved.map),
                                                                    *vocabulary, *std::move(masks));

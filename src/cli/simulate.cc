@@ -8,8 +8,8 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <thread>
 
+#include "base/cores.h"
 #include "cli/interruption.h"
 #include "cli/progress_bar.h"
 #include "cli/verbs.h"
@@ -117,8 +117,7 @@ Result<simulator::SimulationRequest> make_request(const SimulateArguments& argum
 int run_simulate(const SimulateArguments& arguments) {
   const auto request = make_request(arguments);
   if (!request) return report_error(request.error());
-  const int cores = static_cast<int>(std::thread::hardware_concurrency());
-  ThreadPool pool(arguments.threads > 0 ? arguments.threads : std::max(1, cores));
+  ThreadPool pool(arguments.threads > 0 ? arguments.threads : processor_cores());
   const Interruption interruption;
   ProgressBar bar(arguments.progress == "auto", "images");
   const auto outcome = simulator::write_simulation(

@@ -9,9 +9,9 @@
 #include <mutex>
 #include <optional>
 #include <string>
-#include <thread>
 #include <vector>
 
+#include "base/cores.h"
 #include "cli/progress_bar.h"
 #include "cli/verbs.h"
 #include "dataset/training_images.h"
@@ -108,7 +108,7 @@ int run_train(const VocabTrainArguments& a) {
   const auto files = dataset::find_images(a.images);
   if (!files) return report_error(files.error());
   if (files->empty()) return report_error({a.images.front(), "", "no images", "PNG, JPEG, PGM or WebP images"});
-  ThreadPool pool(a.threads > 0 ? a.threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency())));
+  ThreadPool pool(a.threads > 0 ? a.threads : processor_cores());
   const TrainingSet set = extract_all(*files, a, pool);
   if (set.images.empty())
     return report_error({a.images.front(), "", "no readable image", "PNG, JPEG, PGM or WebP images"});

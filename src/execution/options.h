@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <thread>
 
+#include "base/cores.h"
 #include "base/options.h"
 
 namespace bslam::execution {
@@ -28,7 +28,7 @@ struct ExecutionOptions {
 
   // Number of threads for loops over this number of cameras.
   int threads_for(std::size_t cameras) const {
-    const int available = threads > 0 ? threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+    const int available = threads > 0 ? threads : processor_cores();
     return std::min(available, static_cast<int>(cameras));
   }
 

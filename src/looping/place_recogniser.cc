@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <limits>
 #include <span>
-#include <thread>
 
+#include "base/cores.h"
 #include "base/memory_count.h"
 #include "base/thread_pool.h"
 
@@ -99,7 +99,7 @@ void BagOfWordsRecogniser::sync(const map::BundledMap& map) {
     }
   }
   const bool many = entries.size() >= kManyKeyframes;
-  ThreadPool pool(many ? std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, kMaxThreads) : 1);
+  ThreadPool pool(many ? std::min(processor_cores(), kMaxThreads) : 1);
   pool.for_each(entries.size(),
                 [&](std::size_t i) { entries[i].words = words_of(*map.keyframe(entries[i].keyframe).frame); });
   index_.add(entries);

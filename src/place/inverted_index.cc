@@ -33,7 +33,8 @@ void InvertedIndex::add(std::span<const Entry> entries) {
   }
   by_word_.resize(std::max(by_word_.size(), more.size()));
   for (std::size_t w = 0; w < more.size(); ++w) {
-    if (more[w] > 1) by_word_[w].reserve(by_word_[w].size() + more[w]);
+    // Few entries are left to the growth of the vector, which moves it less often.
+    if (more[w] > std::max<std::size_t>(1, by_word_[w].size())) by_word_[w].reserve(by_word_[w].size() + more[w]);
   }
   for (const Entry& e : entries) add(e.keyframe, e.words);
 }

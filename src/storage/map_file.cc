@@ -7,10 +7,10 @@
 #include <array>
 #include <cmath>
 #include <memory>
-#include <thread>
 #include <utility>
 
 #include "base/atomic_file.h"
+#include "base/cores.h"
 #include "base/mapped_file.h"
 #include "base/number_text.h"
 #include "map/rigs_of_map.h"
@@ -35,7 +35,7 @@ constexpr int kMaxThreads = 8;
 // Threads to write or read so many bytes.
 int threads_for(std::size_t bytes) {
   if (bytes < kParallelBytes) return 1;
-  return std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, kMaxThreads);
+  return std::min(processor_cores(), kMaxThreads);
 }
 
 struct Sections {

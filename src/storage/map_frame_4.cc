@@ -46,13 +46,9 @@ void take_words(SectionReader& in, frame::CameraFrame& camera, bool with_words, 
     return;
   std::vector<WordId> words;
   words.reserve(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    const WordId word(in.number<std::int32_t>());
-    if (!in.require(word.valid(), "a negative word", "words of the vocabulary")) return;
-    words_end = std::max(words_end, word.index() + 1);
-    words.push_back(word);
-  }
+  for (std::size_t i = 0; i < n; ++i) words.emplace_back(in.number<std::int32_t>());
   camera.words = std::move(words);
+  check_words(in, camera.words, words_end);
 }
 
 void take_camera(SectionReader& in, const camera::Camera& calibration, int levels, bool with_words,
@@ -126,19 +122,7 @@ void take_bundled(SectionReader& in, frame::BundledFrame& frame) {
 
 frame::BundledFrame take_frame_4(SectionReader& in, const camera::Rig& rig, const feature::PyramidShape& pyramid,
                                  bool with_words, std::size_t& words_end) {
-  frame::BundledFrame frame;
-  frame.id = FrameId(in.number<std::int32_t>());
-  frame.time_ns = in.number<TimeNs>();
-  in.numbers(frame.twist.data(), 6);
-  if (!check_frame(in, frame)) return frame;
-  frame.cameras.resize(rig.size());
-  for (std::size_t c = 0; c < rig.size() && in.ok(); ++c) {
-    in.enter("camera", c);
-    take_camera(in, rig.camera(c), pyramid.levels, with_words, words_end, frame.cameras[c]);
-    in.leave();
-  }
-  if (in.ok()) take_bundled(in, frame);
-  return frame;
+  return take_frame_of(in, rig, pyramid, with_words, words_end, take_camera, take_bundled);
 }
 
 }  // namespace bslam::storage

@@ -91,10 +91,7 @@ void take_camera(SectionReader& in, const camera::Camera& calibration, int level
   camera.keypoints = take_keypoints(in, n);
   if (!in.ok() || !check_keypoints(in, camera.keypoints, calibration, levels)) return;
   if (has_words == 1) camera.words = in.array<std::int32_t, WordId>(n);
-  for (const WordId word : camera.words) {
-    if (!in.require(word.valid(), "a negative word", "words of the vocabulary")) return;
-    words_end = std::max(words_end, word.index() + 1);
-  }
+  if (!check_words(in, camera.words, words_end)) return;
   camera.keypoints.patch = take_patches(in, n, patches);
   if (in.ok()) camera.grid = frame::FeatureGrid(camera.keypoints, calibration.width, calibration.height);
 }
@@ -181,10 +178,12 @@ bool check_image(SectionReader& in, std::uint32_t state, frame::CameraFrame& cam
   return in.require(std::abs(camera.time_ns / 2) < kMaxTime / 2, "a time out of range", "nanoseconds");
 }
 
-bool check_frame(SectionReader& in, const frame::BundledFrame& frame) {
-  return in.require(std::abs(frame.time_ns / 2) < kMaxTime / 2, "a time out of range", "nanoseconds") &&
-         in.require(frame.twist.allFinite() && frame.twist.cwiseAbs().maxCoeff() < kMaxTwist, "an invalid twist",
-                    "finite numbers in rad/s and m/s");
+bool check_words(SectionReader& in, const SharedArray<WordId>& words, std::size_t& words_end) {
+  for (const WordId word : words) {
+    if (!in.require(word.valid(), "a negative word", "words of the vocabulary")) return false;
+    words_end = std::max(words_end, word.index() + 1);
+  }
+  return in.ok();
 }
 
 // Pixels may be outside of the image, but not by more than its size.
@@ -212,13 +211,18 @@ void put_frame(const frame::BundledFrame& frame, const geometry::Vector6d& twist
   put_bundled(frame.bundled, out);
 }
 
-frame::BundledFrame take_frame(SectionReader& in, const camera::Rig& rig, const feature::PyramidShape& pyramid,
-                               bool with_words, std::size_t& words_end) {
+frame::BundledFrame take_frame_of(SectionReader& in, const camera::Rig& rig, const feature::PyramidShape& pyramid,
+                                  bool with_words, std::size_t& words_end, TakeCamera& take_camera,
+                                  TakeBundled& take_bundled) {
   frame::BundledFrame frame;
   frame.id = FrameId(in.number<std::int32_t>());
   frame.time_ns = in.number<TimeNs>();
   in.numbers(frame.twist.data(), 6);
-  if (!check_frame(in, frame)) return frame;
+  if (!in.require(std::abs(frame.time_ns / 2) < kMaxTime / 2, "a time out of range", "nanoseconds") ||
+      !in.require(frame.twist.allFinite() && frame.twist.cwiseAbs().maxCoeff() < kMaxTwist, "an invalid twist",
+                  "finite numbers in rad/s and m/s")) {
+    return frame;
+  }
   frame.cameras.resize(rig.size());
   for (std::size_t c = 0; c < rig.size() && in.ok(); ++c) {
     in.enter("camera", c);
@@ -227,6 +231,11 @@ frame::BundledFrame take_frame(SectionReader& in, const camera::Rig& rig, const 
   }
   if (in.ok()) take_bundled(in, frame);
   return frame;
+}
+
+frame::BundledFrame take_frame(SectionReader& in, const camera::Rig& rig, const feature::PyramidShape& pyramid,
+                               bool with_words, std::size_t& words_end) {
+  return take_frame_of(in, rig, pyramid, with_words, words_end, take_camera, take_bundled);
 }
 
 }  // namespace bslam::storage

@@ -1,6 +1,7 @@
 // Writes and reads the sections of keyframes and landmarks of saved maps.
 #include <algorithm>
 #include <numeric>
+#include <type_traits>
 #include <utility>
 
 #include "storage/map_sections.h"
@@ -12,13 +13,19 @@ constexpr std::size_t kHeadBytes = 2 * sizeof(std::uint32_t);                   
 constexpr std::size_t kKeyframeBytes = kTransformBytes + 2 * 4 + 8 + 6 * 8 + 2 * 8;  // minimum, without cameras
 constexpr std::size_t kKeyframesPerTask = 16;
 
-// The arrays of landmarks are written from vectors of one property each.
-template <class Value, class Of>
-std::vector<Value> values_of(std::span<const LandmarkId> ids, const Of& of) {
-  std::vector<Value> out;
-  out.reserve(ids.size());
-  for (const LandmarkId l : ids) out.push_back(of(l));
-  return out;
+// Writes a property of each of these landmarks as one array.
+template <class Of>
+void put_property(std::span<const LandmarkId> landmarks, const Of& of, ByteWriter& out) {
+  using Value = std::invoke_result_t<Of, LandmarkId>;
+  std::vector<Value> values;
+  values.reserve(landmarks.size());
+  for (const LandmarkId l : landmarks) values.push_back(of(l));
+  if constexpr (std::is_arithmetic_v<Value>) {
+    out.array(values.data(), values.size());
+  } else {
+    const auto* const first = values.empty() ? nullptr : values.front().data();
+    out.array(first, values.empty() ? 0 : values.size() * static_cast<std::size_t>(values.front().size()));
+  }
 }
 
 // Where each keyframe begins in the section, and where the last one ends.
@@ -47,10 +54,7 @@ Keyframe take_keyframe(SectionReader in, std::size_t i, std::size_t keyframes, b
   Keyframe out;
   in.enter("keyframe", i);
   out.T_rig_world = take_transform(in);
-  const auto parent = in.number<std::int32_t>();
-  in.require(parent >= -1 && (parent < 0 || static_cast<std::size_t>(parent) < keyframes),
-             "a parent that does not exist", "a keyframe, or -1");
-  out.parent = KeyframeId(parent);
+  out.parent = take_parent(in, keyframes);
   auto frame = take_frame(in, map.rig(), map.pyramid(), with_words, out.words_end);
   if (in.ok()) in.finish();
   if (!in.ok()) out.error = in.error();
@@ -59,6 +63,13 @@ Keyframe take_keyframe(SectionReader in, std::size_t i, std::size_t keyframes, b
 }
 
 }  // namespace
+
+KeyframeId take_parent(SectionReader& in, std::size_t keyframes) {
+  const auto parent = in.number<std::int32_t>();
+  in.require(parent >= -1 && (parent < 0 || static_cast<std::size_t>(parent) < keyframes),
+             "a parent that does not exist", "a keyframe, or -1");
+  return KeyframeId(parent);
+}
 
 void put_keyframes(const map::BundledMap& map, const FileIds& ids, bool with_words, ByteWriter& out) {
   out.count(map.num_keyframes());
@@ -107,14 +118,7 @@ KeyframeSection take_keyframes(SectionReader& in, bool with_words, const map::Bu
 void put_landmarks(const map::BundledMap& map, const FileIds& ids, ByteWriter& out) {
   const std::vector<LandmarkId> landmarks = map.landmark_ids();
   const auto keyframe = [&](KeyframeId k) { return ids.keyframe[k.index()].value(); };
-  const auto put = [&]<class Value>(Value /*example*/, std::size_t numbers, const auto& of) {
-    const auto values = values_of<Value>(landmarks, of);
-    if constexpr (std::is_arithmetic_v<Value>) {
-      out.array(values.data(), values.size());
-    } else {
-      out.array(values.empty() ? nullptr : values.data()->data(), numbers * values.size());
-    }
-  };
+  const auto put = [&](const auto& property) { put_property(landmarks, property, out); };
   const auto of = [&](LandmarkId l) -> const map::Landmark& { return map.landmark(l); };
   std::vector<std::int32_t> observing, features;
   std::vector<std::uint8_t> aligned;
@@ -127,19 +131,19 @@ void put_landmarks(const map::BundledMap& map, const FileIds& ids, ByteWriter& o
   }
   out.count(landmarks.size());
   out.count(observing.size());
-  put(Eigen::Vector3d(), 3, [&](LandmarkId l) { return of(l).position; });
-  put(Eigen::Vector3d(), 3, [&](LandmarkId l) { return of(l).view_direction; });
-  put(feature::Descriptor(), 4, [&](LandmarkId l) { return of(l).descriptor; });
-  put(Eigen::Vector2f(), 2, [&](LandmarkId l) { return Eigen::Vector2f(of(l).min_distance, of(l).max_distance); });
-  put(std::int32_t(), 1, [&](LandmarkId l) { return keyframe(of(l).reference.keyframe); });
-  put(std::int32_t(), 1, [&](LandmarkId l) { return ids.nearest_older(of(l).born).value(); });
-  put(std::array<std::int32_t, 2>(), 2, [&](LandmarkId l) {
+  put([&](LandmarkId l) { return of(l).position; });
+  put([&](LandmarkId l) { return of(l).view_direction; });
+  put([&](LandmarkId l) { return of(l).descriptor; });
+  put([&](LandmarkId l) { return Eigen::Vector2f(of(l).min_distance, of(l).max_distance); });
+  put([&](LandmarkId l) { return keyframe(of(l).reference.keyframe); });
+  put([&](LandmarkId l) { return ids.nearest_older(of(l).born).value(); });
+  put([&](LandmarkId l) {
     const frame::KeypointRef r = of(l).reference.keypoint;
     return std::array{r.camera.value(), r.keypoint.value()};
   });
-  put(std::uint32_t(), 1, [&](LandmarkId l) { return of(l).expected; });
-  put(std::uint32_t(), 1, [&](LandmarkId l) { return of(l).found; });
-  put(std::uint32_t(), 1, [&](LandmarkId l) { return static_cast<std::uint32_t>(map.observations(l).size()); });
+  put([&](LandmarkId l) { return of(l).expected; });
+  put([&](LandmarkId l) { return of(l).found; });
+  put([&](LandmarkId l) { return static_cast<std::uint32_t>(map.observations(l).size()); });
   out.array(observing.data(), observing.size());
   out.array(features.data(), features.size());
   out.array(aligned.data(), aligned.size());

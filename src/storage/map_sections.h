@@ -80,11 +80,20 @@ LandmarkSection take_landmarks_4(SectionReader& in);
 frame::BundledFrame take_frame_4(SectionReader& in, const camera::Rig& rig, const feature::PyramidShape& pyramid,
                                  bool with_words, std::size_t& words_end);
 
-// Checks that files of any version need. `state` and the time of the camera were read, or the keypoints, or the time
-// and the twist of the frame.
+// Checks that files of any version need, after the state and the time of a camera, its keypoints, or its words were
+// read.
 bool check_image(SectionReader& in, std::uint32_t state, frame::CameraFrame& camera);
 bool check_keypoints(SectionReader& in, const feature::Keypoints& k, const camera::Camera& camera, int levels);
-bool check_frame(SectionReader& in, const frame::BundledFrame& frame);
+bool check_words(SectionReader& in, const SharedArray<WordId>& words, std::size_t& words_end);
+// Reads the parent of one of so many keyframes.
+KeyframeId take_parent(SectionReader& in, std::size_t keyframes);
+// Reads a frame, of which these functions read the parts that depend on the version.
+using TakeCamera = void(SectionReader& in, const camera::Camera& calibration, int levels, bool with_words,
+                        std::size_t& words_end, frame::CameraFrame& camera);
+using TakeBundled = void(SectionReader& in, frame::BundledFrame& frame);
+frame::BundledFrame take_frame_of(SectionReader& in, const camera::Rig& rig, const feature::PyramidShape& pyramid,
+                                  bool with_words, std::size_t& words_end, TakeCamera& take_camera,
+                                  TakeBundled& take_bundled);
 
 // Write and read the BundledFrame of a keyframe; implemented in map_frame_bytes.cc.
 void put_frame(const frame::BundledFrame& frame, const geometry::Vector6d& twist, bool with_words, ByteWriter& out);

@@ -19,10 +19,7 @@ KeyframeSection take_keyframes_4(SectionReader& in, bool with_words, const map::
   for (std::size_t i = 0; i < n && in.ok(); ++i) {
     in.enter("keyframe", i);
     section.T_rig_world.push_back(take_transform(in));
-    const auto parent = in.number<std::int32_t>();
-    in.require(parent >= -1 && (parent < 0 || static_cast<std::size_t>(parent) < n), "a parent that does not exist",
-               "a keyframe, or -1");
-    section.parents.emplace_back(parent);
+    section.parents.push_back(take_parent(in, n));
     section.frames.push_back(std::make_shared<const frame::BundledFrame>(
         take_frame_4(in, map.rig(), map.pyramid(), with_words, section.words_end)));
     in.leave();

@@ -18,8 +18,8 @@ double support(const map::BundledMap& map, const FrameMatches& matches,
 
 // Whether landmarks that keyframes observed for long are found about as often as those observed for a short time.
 // `visible`: all that were searched for. What moves has been observed for a short time only: if that is what is found
-// and the rest is not, the pose is that relative to a moving object. True if too few of either are visible to
-// tell.
+// and the rest is not, the pose is that relative to a moving object. True if too few of either
+// are visible to tell.
 bool lasting_landmarks_found(const map::BundledMap& map, std::span<const LandmarkId> visible,
                              const FrameMatches& matches, std::span<const std::uint8_t> inlier);
 
