@@ -21,7 +21,7 @@ namespace {
 
 using Path = std::filesystem::path;
 
-// A System with the Python functions that it calls. All calls that take time release the interpreter's lock.
+// A System with the Python functions that it calls. All calls that take time release the GIL.
 class PythonSystem {
  public:
   PythonSystem(const Rig& rig, const Config& config, Startup startup, Handlers handlers);

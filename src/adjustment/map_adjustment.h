@@ -13,7 +13,7 @@ namespace bslam::adjustment {
 struct AdjustmentOptions {
   int robust_iterations = 4;                    // with Huber kernel, before outliers are classified
   int final_iterations = 5;                     // without robust kernel, on the inliers
-  double relative_decrease = 1e-4;              // of the cost; smaller means converged
+  double relative_decrease = 1e-4;              // converged if a step decreases the cost by a smaller fraction
   double outlier_chi2 = solver::kChi2TwoDof95;  // squared normalised error above which an observation is removed
   // Number of observations of a landmark that together carry the information of one: errors of a landmark in successive
   // images are similar. For the covariances of the poses only.

@@ -9,7 +9,7 @@ namespace bslam::calibration {
 namespace {
 
 constexpr std::size_t kMinKeypoints = 100;  // per image; images with fewer, of a dark or blank scene, tell nothing
-constexpr double kMuchOverlap = 0.4;        // of views of which some features are expected to be matched
+constexpr double kMuchOverlap = 0.4;        // overlap above which some features are expected to be matched
 constexpr double kHardlyAny = 0.02;         // share of matched keypoints; 0.1 to 0.7 is usual
 constexpr double kEnough = 0.2;             // with this share a pair with much overlap needs no further test
 constexpr int kMinKeyframes = 2;            // for a statement about hardly any matches

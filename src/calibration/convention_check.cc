@@ -18,7 +18,7 @@ using geometry::SE3;
 
 constexpr int kMaxHamming = 60;       // bits; largest descriptor distance of a match
 constexpr double kRatio = 0.85;       // largest ratio of best to second best descriptor distance
-constexpr double kTolerancePx = 2.0;  // of calibration and feature localisation together
+constexpr double kTolerancePx = 2.0;  // tolerance for the errors of calibration and feature localisation together
 constexpr int kMinAgreeing = 25;
 constexpr double kMinRatio = 0.4;     // minimum fraction of consistent matches; random matches reach a few per cent
 constexpr double kClearly = 1.3;      // factor between numbers of consistent matches that counts as a clear difference

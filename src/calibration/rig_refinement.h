@@ -28,23 +28,25 @@ enum class Refine {
 struct CalibrationOptions {
   Refine refine = Refine::kAuto;
   bool check = true;      // at the end of a run, estimate the calibration and report differences
-  int keyframes = 2000;   // maximum number, in segments of consecutive keyframes distributed over the map
+  int keyframes = 2000;   // maximum number, in segments of consecutive keyframes that are distributed over the map
   int landmarks = 20000;  // maximum number, distributed over segments and cameras
   // Standard deviations of the given calibration: the prior of the estimate. Extrinsics: per axis. Focal lengths
   // and their ratio: relative. Principal points: per axis, of the image width. Distortion: of the model table
   // (camera/model_table.h).
   double sigma_rotation_deg = 2.0;
   double sigma_translation_mm = 2.0, sigma_translation_percent = 1.0;  // added in quadrature
-  double sigma_depth_mm = 5.0;       // of translations, additionally along the optical axes (solver::ExtrinsicPrior)
-  double sigma_scale_percent = 0.5;  // of the common scale of all baselines, which images do not reveal
+  // Additional standard deviation of translations along the optical axes (solver::ExtrinsicPrior)
+  double sigma_depth_mm = 5.0;
+  double sigma_scale_percent = 0.5;  // of the common scale of all baselines, which the images do not determine
   // During a run, the map keeps its scale while it differs from that of the calibrated baselines by less than this, or
   // by less than the standard deviation of the estimate.
   double scale_tolerance_percent = 1.5;
   double sigma_focal_percent = 1.0, sigma_aspect_percent = 0.1, sigma_centre_percent = 0.5;
-  // Of time offsets and of the readout times of rolling shutters. They are constant unless the images contradict them
-  // by more than `suspect_ms`.
+  // Standard deviations of the given time offsets and readout times of rolling shutters. These are kept constant unless
+  // the images contradict them by more than `suspect_ms`.
   double sigma_time_offset_ms = 5.0, sigma_readout_ms = 10.0;
-  // Number of observations with the information of one: errors of a landmark in successive images are similar.
+  // Number of observations that carry as much information as one, because the errors of a landmark in successive images
+  // are similar.
   double correlated_observations = 10;
   // The images contradict the calibration if it increases their mean squared error by more than this fraction.
   double inconsistent_excess = 0.1;
@@ -53,7 +55,7 @@ struct CalibrationOptions {
   // wrong timestamps: a camera with a time offset of 1 ms appears displaced by 10 mm at 10 m/s and rotated by 0.1
   // degrees at 100 degrees/s.
   double suspect_sigmas = 5.0, suspect_deg = 0.3, suspect_mm = 10.0;
-  double suspect_ms = 0.5;  // the same for time offsets and readout times
+  double suspect_ms = 0.5;  // absolute threshold for time offsets and readout times
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
@@ -149,16 +151,17 @@ struct CameraRefinement {
 struct RigRefinement {
   bool done = false;  // false: one camera only, no metric scale, too few observations, stopped or failed
   std::vector<CameraRefinement> cameras;     // all cameras in the order of the rig, if done
-  std::size_t keyframes = 0, landmarks = 0;  // numbers used
-  double excess_error = 0;  // increase of the mean squared error by the given calibration, as a fraction
+  std::size_t keyframes = 0, landmarks = 0;  // numbers of keyframes and landmarks used
+  double excess_error = 0;                   // relative increase of the mean squared error with the given calibration
   Verdict verdict = Verdict::kUnknown;
   // If done: the estimated rig, and the poses and landmarks that belong to it, of the keyframes and landmarks used.
   std::optional<camera::Rig> rig;
-  RigInformation information;  // of the estimate, to combine it with those of other maps
+  RigInformation information;  // information of the estimate, to combine it with estimates from other maps
   double scale_change = 1;     // factor by which the lengths of the map change
-  double scale_deviation = 0;  // of scale_change, by the error of the calibration; 0 if it is not known
-  double kept_scale = 1;       // factor by which keep_scale() multiplied the baselines
-  map::SetPoses poses;         // after this change
+  // Standard deviation of scale_change due to the error of the calibration; 0 if it is not known.
+  double scale_deviation = 0;
+  double kept_scale = 1;  // factor by which keep_scale() multiplied the baselines
+  map::SetPoses poses;    // poses of keyframes after the change of scale
 };
 
 // Selects keyframes and landmarks and adjusts them with free calibration, beginning with the rig of the map; the map is
@@ -174,14 +177,15 @@ Eigen::MatrixXd prior_information(const camera::Rig& calibrated, const Calibrati
 bool accepted(const RigRefinement& refinement, const CalibrationOptions& options);
 // Whether an earlier estimate has replaced the calibration of a map. An accepted estimate always changes extrinsics.
 bool replaced(const camera::Rig& of_map, const camera::Rig& calibrated);
-// As refine_rig, if the estimate is to be accepted. If this depends on the verdict, it is determined first from a
-// fraction of the keyframes and landmarks.
+// Returns the result of refine_rig if the estimate is to be accepted. If that depends on the verdict, the verdict is
+// determined first from a fraction of the keyframes and landmarks.
 std::optional<RigRefinement> refine_if_accepted(const map::BundledMap& map, const camera::Rig& calibrated,
                                                 const CalibrationOptions& options,
                                                 const feature::FeatureModel& features,
                                                 const std::stop_token& stop = {});
-// Moves the submap of a keyframe as a whole so that the keyframe has the given pose. The world frame is where the root
-// was at first: the distance of the root from the origin is an error of all keyframes, and added to their uncertainty.
+// Moves the submap of a keyframe as a whole so that the keyframe has the given pose. The origin of the world frame is
+// the original pose of the root. The displacement of the root is therefore an error of all keyframes, and is added to
+// their uncertainty.
 void move_submap(KeyframeId keyframe, const geometry::SE3& T_rig_world, map::MapDraft& draft);
 // Replaces the rig of the draft's map by the estimate, with the poses and landmarks that belong to it; all others have
 // to be adjusted afterwards. The refinement must be done, and its map the draft's.

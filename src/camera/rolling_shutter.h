@@ -9,7 +9,7 @@ namespace bslam::camera {
 
 // When the rows of a camera are exposed, relative to the capture time of its image.
 struct CameraTiming {
-  double shift_s = 0;    // of the middle row: the error of the capture time
+  double shift_s = 0;    // exposure of the middle row minus the capture time: the error of the capture time
   double readout_s = 0;  // see Camera::readout_s
 };
 

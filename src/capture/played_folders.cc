@@ -96,7 +96,7 @@ class PlayedFolder final : public Device {
   const std::string path_;
   const std::vector<image_files::NumberedImage> images_;
   const std::shared_ptr<Playback> playback_;
-  std::size_t& next_;  // of playback_
+  std::size_t& next_;  // index of the next image, in playback_
   int width_ = 0, height_ = 0;
   bool jpeg_ = false;
   std::string bytes_;

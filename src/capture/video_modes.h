@@ -1,4 +1,4 @@
-// What a V4L2 device is and offers.
+// The capabilities of a V4L2 device.
 #pragma once
 
 #include <string>
@@ -13,15 +13,15 @@ namespace bslam::capture {
 struct VideoMode {
   FourCc pixels = 0;
   int width = 0, height = 0;          // the largest of a range; 0 if the driver does not tell
-  int min_width = 0, min_height = 0;  // as width and height if the size is fixed
+  int min_width = 0, min_height = 0;  // the smallest of a range; width and height if the size is fixed
   int step_width = 0, step_height = 0;
-  std::vector<double> fps = {};  // frames per second, the highest first; of a range its ends; empty: unknown
-  bool any_between = false;      // all rates between the highest and the lowest
+  std::vector<double> fps = {};  // frame rates in Hz, highest first; the two ends if they form a range; empty: unknown
+  bool any_between = false;      // true: all rates between the highest and the lowest are possible
 
   bool has_size(int w, int h) const;
 };
 
-// As ioctl(), but repeated where a signal interrupted it.
+// Calls ioctl() and repeats it if a signal interrupted it.
 int video_ioctl(VideoCalls& calls, int device, unsigned long request, void* argument);
 
 // All modes of a capture device, in its order.

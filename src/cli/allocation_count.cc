@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <new>
 
-#ifndef BSLAM_ONE_VERSION  // which builds with sanitizers define
+#ifndef BSLAM_ONE_VERSION  // defined by builds with sanitizers
 
 namespace {
 

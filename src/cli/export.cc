@@ -29,7 +29,7 @@ using geometry::SE3;
 struct TrajectoryArguments {
   std::string file, out, format, frame, axes, stamps, up;
   std::optional<fs::path> rig, map, times;
-  std::optional<int> camera;  // of the rig file: that of the trajectory
+  std::optional<int> camera;  // camera of the rig file whose poses the trajectory contains
   bool overwrite = false;
 };
 

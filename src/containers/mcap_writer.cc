@@ -18,7 +18,7 @@ constexpr unsigned char kHeader = 1, kFooter = 2, kSchema = 3, kChannel = 4, kMe
                         kMessageIndex = 7, kChunkIndex = 8, kAttachment = 9, kAttachmentIndex = 10, kStatistics = 11,
                         kMetadata = 12, kMetadataIndex = 13, kDataEnd = 15;
 constexpr std::size_t kChunkBytes = std::size_t{4} << 20;
-constexpr int kLevel = 1;  // of zstd: images are noise mostly, and higher levels hardly find more
+constexpr int kLevel = 1;  // level of zstd; images are mostly noise, so that higher levels hardly compress better
 
 static_assert(std::endian::native == std::endian::little, "numbers are written as they lie in memory");
 

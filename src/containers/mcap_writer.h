@@ -27,7 +27,7 @@ class McapWriter {
   McapWriter(const McapWriter&) = delete;
   McapWriter& operator=(const McapWriter&) = delete;
 
-  // Adds a file, or names with values, before the first message. Errors: as of flush.
+  // Adds a file, or names with values, before the first message. Errors: those of flush.
   Status attach(const std::string& name, const std::string& media_type, std::string_view bytes);
   Status add_metadata(const std::string& name, const std::map<std::string, std::string>& values);
 
@@ -43,7 +43,7 @@ class McapWriter {
   // Writes chunk and index. No call may follow.
   Status finish();
 
-  std::uint64_t bytes() const { return at_; }  // written so far
+  std::uint64_t bytes() const { return at_; }  // bytes written so far
 
  private:
   struct Channel {

@@ -79,7 +79,7 @@ class RosBag1 : public ChunkedFile {
   }
 
  private:
-  // The record at a position of a chunk; nullopt if it is not complete up to its data. The data may be cut off.
+  // Returns the record at a position in a chunk; nullopt if its header is incomplete. The data may be truncated.
   std::optional<Record> record_at(std::uint32_t chunk, std::uint64_t at) const {
     constexpr std::uint64_t kMostHeaders = 512;
     std::string head = bytes(chunk, at, kMostHeaders);
@@ -202,7 +202,7 @@ bool RosBag1::add_index(const Record& record) {
 // Reads a record outside of chunks. Returns false if it is damaged.
 bool RosBag1::read_record(std::uint64_t at, const Record& record) {
   const bool whole = record.end() <= file().size();
-  if (record.op == kChunk) return add_chunk_of(record) && whole;  // the start of a chunk that is cut off is read
+  if (record.op == kChunk) return add_chunk_of(record) && whole;  // of a truncated chunk the beginning is read
   if (!whole) return false;
   if (record.op == kBagHeader) read_index_section(record);
   if (record.op == kConnection) add_connection(0, record);

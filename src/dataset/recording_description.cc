@@ -65,7 +65,7 @@ std::vector<std::string> missing_for(const DatasetRequest& request, const Record
                       rig->size(), request.rig_file->string(), rig->size(), recording.camera_count()));
     }
     for (const StreamDescription& s : streams) {
-      const auto c = static_cast<std::size_t>(s.camera);  // of the run
+      const auto c = static_cast<std::size_t>(s.camera);  // index in the run
       const std::size_t of_rig = request.cameras.empty()      ? c
                                  : c < request.cameras.size() ? static_cast<std::size_t>(request.cameras[c])
                                                               : rig->size();

@@ -1,4 +1,5 @@
-// The uncertainty of a pose T: of the left perturbation delta, rotation (rad) first, with T_true = exp(delta) T.
+// The uncertainty of a pose T: that of the left perturbation delta with T_true = exp(delta) T, rotation (rad) first,
+// then translation.
 #pragma once
 
 #include "geometry/se3.h"

@@ -90,7 +90,7 @@ struct LoopOptions {
   // Maximum translation of the correction, relative to the path length since the place was last seen plus the median
   // depth of the scene; a larger one is a false match, not drift.
   double max_drift = 0.05;
-  double max_drift_free = 0.3;  // the same in maps whose scale is not metric
+  double max_drift_free = 0.3;  // the same maximum in maps whose scale is not metric
   // In metric maps, loops with a smaller reprojection error are corrected without a pose graph.
   double max_bundle_error_px = 4.0;
   int edge_weight = 60;  // minimum number of shared landmarks for a covisibility edge of the pose graph

@@ -77,7 +77,7 @@ struct CullingOptions {
 struct LocalWindowOptions {
   int free_keyframes = 12;   // the newest keyframe and its best covisible ones
   int fixed_keyframes = 24;  // other keyframes that observe their landmarks, held fixed
-  int max_landmarks = 4000;  // those observed most often are adjusted
+  int max_landmarks = 4000;  // maximum number of adjusted landmarks; those with most observations are chosen
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
@@ -100,7 +100,7 @@ struct ScaleOptions {
   int rounds = 4;         // rounds of scale estimation and adjustment per keyframe while the scale changes
   double converged_change = 0.05;       // relative change of the scale below which no further round follows
   double sigma_rotation_deg = 0.5;      // standard deviation of calibrated rotations, per axis
-  double correlated_observations = 10;  // number of observations with the information of one
+  double correlated_observations = 10;  // number of observations that carry as much information as one
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {

@@ -89,7 +89,8 @@ ScaleReport observe_scale(KeyframeId keyframe, const ScaleOptions& options, cons
     report.correction = correction;
     draft.scale_submap(map.root_of(keyframe), correction);
   }
-  const double left = std::abs(found->scale / correction - 1.0);  // of a scale that was too far off for one step
+  // Remaining relative error of a scale that was too far off for one step.
+  const double left = std::abs(found->scale / correction - 1.0);
   draft.set_scale(map::Scale::kUnobservable, std::max(found->deviation, left));
   return report;
 }

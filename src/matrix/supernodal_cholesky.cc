@@ -93,7 +93,7 @@ int total(const std::vector<int>& begin, const std::vector<int>& rows) {
 // narrow.
 bool belong_together(const Columns& last, const Columns& next, const std::vector<int>& begin) {
   constexpr int kNarrow = 36;         // columns
-  constexpr double kFewZeros = 0.15;  // of the entries of the columns that are extended
+  constexpr double kFewZeros = 0.15;  // maximum fraction of zeros among the entries of columns that are extended
   if (last.below.empty() || last.below.front() != next.first) return false;
   const int columns = begin[at(last.first + last.count)] - begin[at(last.first)],
             more = begin[at(next.first + next.count)] - begin[at(next.first)];

@@ -62,8 +62,8 @@ std::string reason_of(const looping::JoinAttempts& attempts, const looping::Loop
 }
 
 struct Inputs {
-  map::BundledMap map;                             // of all of them
-  std::vector<std::vector<KeyframeId>> keyframes;  // of each
+  map::BundledMap map;                             // the map of all inputs
+  std::vector<std::vector<KeyframeId>> keyframes;  // keyframes of each input
   std::vector<MapPart> parts;                      // each
 };
 

@@ -16,7 +16,7 @@ constexpr int kMinTrackedClose = 100, kMinUntrackedClose = 70;
 constexpr double kRestMaxParallax = 0.01;  // rad; a rig at rest has a smaller parallax
 constexpr double kRestMinOverlap = 0.95;
 constexpr std::size_t kMinLandmarks = 100;  // tracked: with fewer, the place may have changed since
-constexpr double kMinShared = 0.6;          // of the inliers, with a similar keyframe
+constexpr double kMinShared = 0.6;          // minimum fraction of the inliers that a similar keyframe observes
 constexpr std::size_t kNewest = 5;          // number of keyframes that the rig has not left yet
 constexpr double kSimilarParallax = 0.5;    // maximum parallax to it, relative to that of a new keyframe
 constexpr int kFewInliersInterval = 8;  // minimum number of frames between keyframes due to a camera with few inliers

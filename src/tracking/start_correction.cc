@@ -13,7 +13,7 @@ namespace bslam::tracking {
 namespace {
 
 constexpr int kMaxHamming = 60;  // bits
-constexpr double kRatio = 0.85;  // of the nearest to the second nearest descriptor
+constexpr double kRatio = 0.85;  // maximum ratio of the nearest to the second nearest descriptor distance
 constexpr std::size_t kMinMatches = 60;
 constexpr double kMinAgreeing = 0.6;  // fraction of the matches that agree with the correction
 constexpr int kMinWithDepth = 25;     // number of these that are in front of both cameras

@@ -10,13 +10,13 @@
 namespace bslam::web_server {
 
 struct FormPart {
-  std::string_view name;     // of the field, as sent
+  std::string_view name;     // name of the field, as sent
   std::string_view content;  // bytes
 };
 
 struct FormLimits {
   std::size_t parts = 64;
-  std::size_t header_bytes = 2048;  // of one part
+  std::size_t header_bytes = 2048;  // maximum size of the headers of one part
 };
 
 // Splits the body into its parts, which refer to `body`. Names of files and types of parts are ignored. Errors: another

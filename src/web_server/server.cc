@@ -26,7 +26,7 @@ namespace websocket = beast::websocket;
 using ErrorCode = boost::system::error_code;
 using SharedText = std::shared_ptr<const std::string>;
 
-constexpr double kMaxShare = 0.03;  // of the processor time of a core that updates of a channel may take
+constexpr double kMaxShare = 0.03;  // maximum fraction of a core's time that updates of a channel may take
 
 }  // namespace
 
