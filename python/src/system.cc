@@ -178,11 +178,11 @@ void bind_processing(nb::class_<PythonSystem>& system) {
                   "masks: collections.abc.Sequence[numpy.typing.NDArray[numpy.uint8] | None] | None = None) -> Frame"),
           "Estimates the pose of the rig for images taken at the same time.\n\n"
           "The images are raw (neither undistorted nor rectified). They are read without a copy during the call, with\n"
-          "the interpreter unlocked, so do not change them meanwhile; afterwards their memory may be used again.\n\n"
+          "the GIL released, so do not change them meanwhile; afterwards their memory may be used again.\n\n"
           "Args:\n"
           "    stamps: middle of each exposure in nanoseconds, or one time for all images.\n"
-          "    images: one per camera of the rig, in its order: uint8 of shape (height, width), whose rows may be\n"
-          "        any distance apart; None where there is no image.\n"
+          "    images: one per camera of the rig, in its order: uint8 of shape (height, width) with any row stride\n"
+          "        and contiguous pixels in a row; None where there is no image.\n"
           "    masks: uint8 like the images; 0 marks pixels to ignore. None where there is no mask.\n\n"
           "Returns:\n"
           "    The result. A lost frame is a result, not an error.")
@@ -190,7 +190,7 @@ void bind_processing(nb::class_<PythonSystem>& system) {
            "Waits for background work and adjusts the whole map. To be called once, after the last frame.")
       .def(
           "interrupt", [](PythonSystem& s) { (*s).interrupt(); },
-          "Makes the current call, in another thread, and finish() return soon; background work ends for good.");
+          "Makes the current call in another thread and finish() return soon. Background work is not resumed.");
 }
 
 }  // namespace

@@ -221,7 +221,7 @@ int run_live(const LiveArguments& a, const system::Config& config, const LiveRig
     }
     cameras.begin();
     if (a.duration_s) timer.emplace(*a.duration_s, [&cameras] { cameras.stop(); });
-    dataset.first_time_ns = cameras.wait_for_frame().value_or(*first_time_ns);  // of those that are processed
+    dataset.first_time_ns = cameras.wait_for_frame().value_or(*first_time_ns);  // time of the first processed frame
     return {};
   };
   input.after = [&] {
@@ -237,7 +237,7 @@ int run_live(const LiveArguments& a, const system::Config& config, const LiveRig
   return run_and_write(a.slam, std::move(input), control);
 }
 
-// Folders of images have nothing that could be set.
+// Folders of images have no settings.
 Status check_settings_of_cameras(const LiveArguments& a, const std::vector<std::string>& paths) {
   const auto folder = std::ranges::find_if(paths, is_folder);
   if (folder == paths.end()) return {};

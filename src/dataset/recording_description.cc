@@ -51,7 +51,7 @@ std::vector<SynchronyDescription> synchrony(const std::vector<StreamDescription>
   return out;
 }
 
-// What is needed to run the recording beside its images.
+// Returns the input that is needed to run the recording besides its images.
 std::vector<std::string> missing_for(const DatasetRequest& request, const Recording& recording,
                                      const std::vector<StreamDescription>& streams) {
   std::vector<std::string> missing;
@@ -168,7 +168,7 @@ void number_cameras(const DatasetRequest& request, const Recording& recording, R
   }
 }
 
-// Opens the recording as `run` does: nothing else is missing for it, or it says what is.
+// Opens the recording as `run` does. Its error tells what else is missing.
 void try_to_open(const DatasetRequest& request, const OpenRecording& opened, RecordingDescription& out) {
   const auto dataset = dataset_of(request, opened);
   if (!dataset) {

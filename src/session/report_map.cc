@@ -88,8 +88,8 @@ ordered_json path_json(const evaluation::Trajectory& path, TimeNs first_ns, std:
   return {{"time", float_array(time)}, {"position", float_array(position)}, {"rotation", float_array(rotation)}};
 }
 
-// Returns the ray of a pixel at depth 1. Rays farther than this from the optical axis are not drawn: instead the ray of
-// a pixel nearer to the centre is returned.
+// Returns the ray of a pixel at depth 1. If the ray is too far from the optical axis to be drawn, returns the ray of a
+// pixel nearer to the centre.
 Vector3d ray_at_corner(const camera::Camera& camera, const Eigen::Vector2d& corner) {
   constexpr double kMinDepth = 0.35;  // minimum z of a ray of length 1
   const Eigen::Vector2d centre(0.5 * (camera.width - 1), 0.5 * (camera.height - 1));

@@ -21,10 +21,10 @@ constexpr double kDeviations = 1.5;     // maximum difference of two positions i
 constexpr double kNearest = 0.1;        // minimum distance of a point as a fraction of the median distance
 constexpr double kMostOfMatches = 0.5;  // fraction of the matches of a cell that must agree
 
-// Distance, in the plane that touches the unit sphere at a bearing, to the arc on which the point is seen: from
-// `infinite` to `nearest`. Infinite if the bearing is on another side. If the nearest point is behind the camera, the
-// rig would have passed it since the keyframe; the distance is then that to `infinite`, so that an absurd motion, with
-// which a long arc agrees easily, gains nothing.
+// Distance from a bearing to the epipolar arc on which its point can be seen, from `infinite` to `nearest`, in the
+// tangent plane of the unit sphere at the bearing. Infinite if the bearing is on another side. If the nearest point is
+// behind the camera, the rig would have passed it since the keyframe. The distance is then that to `infinite`, because
+// the arc would be so long that wrong motions agree with it easily.
 double distance_to_arc(const Eigen::Vector3d& bearing, const Eigen::Vector3d& infinite,
                        const Eigen::Vector3d& nearest) {
   const double i = infinite.dot(bearing), n = nearest.dot(bearing);
