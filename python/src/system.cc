@@ -151,7 +151,7 @@ void bind_constructor(nb::class_<PythonSystem>& system) {
               "on_loop: collections.abc.Callable[[LoopEvent], object] | None = None, "
               "on_camera: collections.abc.Callable[[CameraEvent], object] | None = None, "
               "on_log: collections.abc.Callable[[str, str], object] | None = None) -> None"),
-      "Creates a system. The names are those of `bslam run`.\n\n"
+      "Creates a system. Arguments have the names of the options of `bslam run`.\n\n"
       "Args:\n"
       "    rig: the calibrated cameras.\n"
       "    mode: sequential, lagged or parallel; default: that of `settings` or `config`, otherwise parallel.\n"
@@ -165,8 +165,8 @@ void bind_constructor(nb::class_<PythonSystem>& system) {
       "    history_frames: minimum number of latest frames in trajectories, for long runs; 0: all.\n"
       "    on_keyframe, on_loop, on_camera: called with a KeyframeEvent, LoopEvent or CameraEvent.\n"
       "    on_log: called with a level (\"info\" or \"warning\") and a line of text.\n\n"
-      "Functions are called by the thread that is in process() or finish(), before it returns; an exception of one of\n"
-      "them is raised by that call.");
+      "The functions are called by the thread that is in process() or finish(), before it returns. If one of them\n"
+      "raises an exception, that call raises it.");
 }
 
 void bind_processing(nb::class_<PythonSystem>& system) {
@@ -213,13 +213,12 @@ void bind_system(nb::module_& module) {
             return rows_of(value_of((*s).trajectory(frame_named(frame))));
           },
           nb::arg("frame") = "cam0",
-          "Returns the poses of all frames that have one, corrected by the current map, (n, 8): t, x, y, z, qx, qy, "
-          "qz,\n"
-          "qw in seconds and metres, for the submap with the most frames.\n\n"
+          "Returns the poses of all frames that have one, corrected by the current map, for the submap with the most\n"
+          "frames: (n, 8) with t, x, y, z, qx, qy, qz, qw in seconds and metres.\n\n"
           "Args:\n"
           "    frame: cam0 (camera 0) or body (the body frame of the calibration).")
       .def("trajectories", trajectories, nb::arg("frame") = "cam0",
-           "Returns trajectory() of all submaps, that with the most frames first.")
+           "Returns trajectory() of all submaps; the submap with the most frames is first.")
       .def("save_trajectory", save_trajectory, nb::arg("path"), nb::arg("frame") = "cam0",
            "Writes trajectory() as TUM file, with times that are exact to the nanosecond.");
 }
