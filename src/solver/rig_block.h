@@ -27,7 +27,7 @@ struct RigValues {
 struct RigObservation {
   int camera = 0;
   const RigValues& values;    // the extrinsics do not include the motion from the time of the pose to that of the image
-  const Vector3d& point_cam;  // metres, at the capture time of the image
+  const Vector3d& point_cam;  // metres, when the row of the pixel was exposed
   const Matrix23d& J;         // d pixel / d point_cam, divided by sigma
   const Vector3d& velocity;   // d point_cam / d time, m/s; zero if it is not known
   double relative_row;        // row of the pixel: -1/2 for the first row, 1/2 for the last
