@@ -29,7 +29,7 @@ struct AdjustmentOptions {
     visitor("outlier_chi2", self.outlier_chi2, Range{0.1, 1e6}, "",
             "squared normalised error above which an observation is removed");
     visitor("correlated_observations", self.correlated_observations, Range{1, 1e4}, "",
-            "number of observations that carry the information of one, for the covariances of poses");
+            "number of observations that carry as much information as one, for the covariances of poses");
   }
 };
 

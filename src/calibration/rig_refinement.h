@@ -60,7 +60,8 @@ struct CalibrationOptions {
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
     visitor("refine", self.refine, Range{}, "",
-            "replace the calibration by an estimate from the images: never, if they contradict it, or always",
+            "replace the calibration by an estimate from the images: false: never; auto: if they contradict it; true: "
+            "always",
             OptionNote{.common = true, .formerly = "extrinsics.refine"});
     visitor("check", self.check, Range{}, "",
             "at the end of a run, estimate the calibration and report cameras that differ from it",
@@ -70,20 +71,24 @@ struct CalibrationOptions {
     visitor("landmarks", self.landmarks, Range{100, 1e6}, "", "maximum number of landmarks used",
             OptionNote{.formerly = "extrinsics.landmarks"});
     visit_deviations(self, visitor);
-    visitor("scale_tolerance_percent", self.scale_tolerance_percent, Range{0, 100}, "%",
-            "minimum change of the scale that is made during a run; its standard deviation if that is larger");
+    visitor(
+        "scale_tolerance_percent", self.scale_tolerance_percent, Range{0, 100}, "%",
+        "during a run, smaller changes of the map's scale are not applied, nor changes within its standard deviation");
     visitor("correlated_observations", self.correlated_observations, Range{1, 1e4}, "",
-            "number of observations with the information of one");
+            "number of observations that carry as much information as one");
     visitor("inconsistent_excess", self.inconsistent_excess, Range{0, 100}, "",
-            "increase of the mean squared error by a calibration that the images contradict, as a fraction");
+            "the images contradict a calibration that increases the mean squared error by more than this fraction");
     visitor("suspect_sigmas", self.suspect_sigmas, Range{1, 100}, "",
             "a suspect camera changed by more than this number of standard deviations",
             OptionNote{.formerly = "extrinsics.suspect_sigmas"});
-    visitor("suspect_deg", self.suspect_deg, Range{0, 180}, "deg", "and rotated by more than this",
+    visitor("suspect_deg", self.suspect_deg, Range{0, 180}, "deg",
+            "minimum rotation of a suspect camera, in addition to suspect_sigmas",
             OptionNote{.formerly = "extrinsics.suspect_deg"});
-    visitor("suspect_mm", self.suspect_mm, Range{0, 1e5}, "mm", "or moved by more than this",
+    visitor("suspect_mm", self.suspect_mm, Range{0, 1e5}, "mm",
+            "minimum displacement of a suspect camera, in addition to suspect_sigmas",
             OptionNote{.formerly = "extrinsics.suspect_mm"});
-    visitor("suspect_ms", self.suspect_ms, Range{0, 1e3}, "ms", "minimum change of a time that is estimated");
+    visitor("suspect_ms", self.suspect_ms, Range{0, 1e3}, "ms",
+            "time offsets and readout times are only refined if the images contradict them by more than this");
   }
 
  private:
@@ -96,11 +101,11 @@ struct CalibrationOptions {
             "standard deviation of calibrated translations, per axis",
             OptionNote{.formerly = "extrinsics.calibration_mm"});
     visitor("sigma_translation_percent", self.sigma_translation_percent, Range{0, 100}, "%",
-            "and, added in quadrature, in percent of the longest distance of a camera from camera 0");
+            "added in quadrature: a part in percent of the longest distance of a camera from camera 0");
     visitor("sigma_depth_mm", self.sigma_depth_mm, Range{0, 1e4}, "mm",
-            "and, added in quadrature, along the optical axes of the camera and of camera 0");
+            "added in quadrature: a part along the optical axes of the camera and of camera 0");
     visitor("sigma_scale_percent", self.sigma_scale_percent, Range{1e-6, 100}, "%",
-            "deviation of the baselines' common scale");
+            "standard deviation of the common scale of all baselines");
     visitor("sigma_focal_percent", self.sigma_focal_percent, Range{1e-3, 50}, "%",
             "standard deviation of calibrated focal lengths");
     visitor("sigma_aspect_percent", self.sigma_aspect_percent, Range{1e-3, 50}, "%",

@@ -209,7 +209,7 @@ void add_bench(CLI::App& app, int& exit_status) {
   verb->add_option("--against", a->against,
                    "compare with this earlier time.json; exit status 1 if a count differs or a time is slower")
       ->needs(time);
-  verb->add_option("--margin", a->margin_percent, "by how many percent a time may be slower")
+  verb->add_option("--margin", a->margin_percent, "tolerated increase of a time in percent")
       ->check(CLI::Range(0.0, 1000.0))
       ->capture_default_str()
       ->needs(time);

@@ -296,8 +296,8 @@ void add_live(CLI::App& app, std::span<const char* const> command_line, int& exi
                    "/dev/video0,/dev/video2; - for a camera that is not used. Folders of images are played in place of "
                    "cameras");
   verb->add_option("--record", a->record,
-                   "write the images of all frames that are processed to this MCAP file, of which bslam run makes the "
-                   "same frames");
+                   "write the images of all processed frames to this MCAP file, from which bslam run creates the same "
+                   "frames");
   verb->add_option("--fps", a->fps, "frame rate to set; default: the highest up to 60 that the camera offers")
       ->check(CLI::Range(0.1, 1000.0));
   verb->add_option("--exposure", a->exposure,
