@@ -72,7 +72,7 @@ struct FrameResult {
   // Covariance of T_world_cam0, if known: of the small motion d, rotation first, in the axes of camera 0, with
   // T_world_cam0(true) = T_world_cam0 exp(d). Relative to the first keyframe of the submap, or to a loaded map: image
   // noise, the drift of the map and, if the calibration was estimated from the images, its remaining error, such as
-  // that of the scale of the baselines. A given calibration counts as exact after the images of some eight keyframes
+  // that of the scale of the baselines. A given calibration is taken as exact after the images of about eight keyframes
   // have not contradicted it, or if calibration.refine is false; until then, the covariance contains the error that it
   // may have. The standard deviations of the position of camera 0 along its own axes are the square roots of elements
   // 21, 28 and 35. Nullopt in the first frame of a map.
@@ -95,7 +95,7 @@ struct FrameResult {
   int keyframe_id = -1;      // its id if it became a keyframe, otherwise the reference keyframe; -1 if none
   bool relocalised = false;  // tracking was recovered by place recognition
   // The initial map was wrong: it was up to scale, and the rig was lost in it soon after, or the cameras that determine
-  // its scale contradicted it. All poses and keyframes reported so far are withdrawn, and the map is empty. A new one
+  // its scale contradicted it. All poses and keyframes reported so far are invalid, and the map is empty. A new one
   // will be initialised; ids of keyframes are not used again.
   bool map_withdrawn = false;
 

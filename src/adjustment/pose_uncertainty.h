@@ -44,7 +44,7 @@ PoseUncertainties pose_uncertainties(const map::BundledMap& map, const BundlePro
                                      double correlated_observations);
 
 // The uncertainties without the error of the calibration, for the keyframes whose uncertainty includes one. Used once
-// the calibration has been compared with the images and counts as exact.
+// the calibration has been compared with the images and is taken as exact.
 PoseUncertainties without_calibration(const map::BundledMap& map);
 
 }  // namespace bslam::adjustment

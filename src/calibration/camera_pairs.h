@@ -34,7 +34,7 @@ struct CameraPair {
 };
 
 // Whether the evidence shows that the images do not belong to the calibration, rather than a calibration that is
-// inaccurate or a camera that was knocked: nearly all matches are consistent with exchanged cameras, with inverted
+// inaccurate or a camera that was bumped: nearly all matches are consistent with exchanged cameras, with inverted
 // transforms, or with a pose of the second camera that has nothing to do with the calibrated one.
 bool shows_another_arrangement(const PairEvidence& evidence);
 

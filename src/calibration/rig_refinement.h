@@ -15,7 +15,7 @@
 
 namespace bslam::calibration {
 
-// Whether the images contradict the calibration. kUnknown: too few observations to tell.
+// Whether the images contradict the calibration. kUnknown: too few observations to decide.
 enum class Verdict { kUnknown, kConsistent, kInconsistent };
 std::string_view verdict_name(Verdict verdict);  // "unknown", "consistent", "inconsistent"
 

@@ -113,7 +113,7 @@ class LiveCameras final : public session::FrameSource {
   std::vector<CameraState> cameras_;
 
   std::mutex say_mutex_;
-  mutable std::mutex mutex_;  // guards all until `threads_`, and what CameraState says
+  mutable std::mutex mutex_;  // guards all members until `threads_`, and the members of CameraState that say so
   std::condition_variable_any changed_;
   std::deque<Waiting> waiting_;
   std::size_t frames_waiting_ = 0;  // waiting frames that were not dropped

@@ -12,7 +12,7 @@ namespace bslam::capture {
 // A pixel format at a size. Devices that scale offer a range of sizes, which is listed by its ends.
 struct VideoMode {
   FourCc pixels = 0;
-  int width = 0, height = 0;          // the largest of a range; 0 if the driver does not tell
+  int width = 0, height = 0;          // pixels, the largest of a range; 0 if the driver does not report it
   int min_width = 0, min_height = 0;  // the smallest of a range; width and height if the size is fixed
   int step_width = 0, step_height = 0;
   std::vector<double> fps = {};  // frame rates in Hz, highest first; the two ends if they form a range; empty: unknown
@@ -31,7 +31,7 @@ std::vector<VideoMode> video_modes(VideoCalls& calls, int device);
 std::string modes_text(const std::vector<VideoMode>& modes);
 
 // Returns the rate of a mode that suits a request best, in frames per second: the one that is asked for, or the highest
-// up to 60; 0 if it has none or the driver does not tell.
+// up to 60; 0 if it has none or the driver does not report it.
 double best_rate(const VideoMode& mode, const StreamRequest& request);
 
 // Returns the mode for a request: of those of its size and of a known pixel format, one with its rate, or with the

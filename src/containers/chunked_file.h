@@ -61,7 +61,7 @@ class ChunkedFile : public MessageFile {
   // Notes that only the first bytes of a chunk could be read.
   void note_cut_chunk(std::uint32_t chunk, std::uint64_t good_bytes);
   // Turns the notes into warnings: of each kind the first, and how many there are. Warns as well of messages that
-  // belong to no topic, and if there are fewer chunks than the file says.
+  // belong to no topic, and if there are fewer chunks than the index lists.
   void finish_notes(std::uint64_t unknown_messages, std::uint64_t expected_chunks);
 
  private:

@@ -35,7 +35,7 @@ class McapWriter {
   std::uint16_t add_topic(const std::string& name, const std::string& type, const std::string& definition);
 
   // Adds a message, which was recorded at `time_ns`, to the chunk, and writes the chunk when it is full. Errors: as of
-  // flush; a time before 1970, which the format does not know.
+  // flush; a time before 1970, which the format cannot represent.
   Status write(std::uint16_t topic, TimeNs time_ns, std::string_view message);
   // Writes the chunk. Error: the disk is full or broken. All later calls return it as well and write nothing, so that
   // the file remains readable up to there.

@@ -13,7 +13,7 @@
 
 namespace bslam::dataset {
 
-// One image of a topic, as its message says.
+// One image of a topic, described by the beginning of its message.
 struct BagImage {
   TimeNs stamp_ns = 0;  // time stamp of the header; 0: not set
   TimeNs received_ns = 0;

@@ -36,8 +36,8 @@ std::optional<std::string> interleaved_warning(const std::vector<image_files::Im
 // everywhere, which may be equal by chance.
 Status check_different_images(const std::vector<std::vector<image_files::ImageFile>>& images);
 
-// Tries to decode a few images spread over the recording. Returns a note that says how many cannot be decoded, and
-// which is the first; nullopt if all can.
+// Tries to decode a few images spread over the recording. Returns a note with the number of images that cannot be
+// decoded and the first of them; nullopt if there are none.
 std::optional<std::string> unreadable_note(const std::vector<image_files::ImageFile>& images);
 
 }  // namespace bslam::dataset

@@ -38,7 +38,7 @@ class Recording {
   // Returns the names of the folders of all cameras, which may be those of cameras in the rig file; empty if they have
   // none, or the order of the cameras was requested.
   virtual std::vector<std::string> folder_names() const { return {}; }
-  // Returns true if these names tell no order of the cameras.
+  // Returns true if the order of the cameras does not follow from these names.
   virtual bool has_own_names() const { return false; }
   // Messages for the user about damaged or missing parts found when the recording was opened.
   virtual std::vector<std::string> warnings() const { return {}; }

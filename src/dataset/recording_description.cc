@@ -138,7 +138,7 @@ void try_images(const DatasetRequest& request, const Recording& recording, Recor
   if (const Status s = check_different_images(images); !s) out.missing.push_back(s.error().message());
 }
 
-// Returns the number in the recording of each camera of the run; nullopt if it cannot be told.
+// Returns the number in the recording of each camera of the run; nullopt if it cannot be determined.
 std::optional<std::vector<int>> cameras_of_run(const DatasetRequest& request, const Recording& recording,
                                                RecordingDescription& out) {
   DatasetRequest with_rig = request;

@@ -76,7 +76,7 @@ class BundledMap {
   // The same cameras with the calibration that runs were given, before any of them refined it.
   const camera::Rig& given_rig() const { return *given_rig_; }
   // Square root L of the covariance L L^T of the calibration: the extrinsics of cameras 1 to N-1 and the intrinsics of
-  // all cameras (calibration::RigInformation). Null if the calibration counts as exact.
+  // all cameras (calibration::RigInformation). Null if the calibration is taken as exact.
   const std::shared_ptr<const Eigen::MatrixXd>& rig_deviation() const { return rig_deviation_; }
   // The pyramid on which keypoints were detected.
   const feature::PyramidShape& pyramid() const { return pyramid_; }

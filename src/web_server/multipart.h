@@ -20,7 +20,7 @@ struct FormLimits {
 };
 
 // Splits the body into its parts, which refer to `body`. Names of files and types of parts are ignored. Errors: another
-// type or no boundary; a body that does not consist of parts as the boundary says, or does not end with the closing
+// type or no boundary; a body that is not divided into parts by the boundary, or does not end with the closing
 // boundary, such as a truncated one; a part without a name; more or longer than the limits. The time is proportional to
 // the length of the body.
 Result<std::vector<FormPart>> parse_form(std::string_view content_type, std::string_view body,
