@@ -120,7 +120,7 @@ void print_memory(const char* when) {
              session::peak_memory_mb().value_or(0));
 }
 
-// Frames that look like a keyframe of the map, but for some bits.
+// Frames that look like a keyframe of the map, except for some descriptor bits.
 void measure_queries(const map::BundledMap& map, looping::PlaceRecogniser& places, const place::Vocabulary& vocabulary,
                      const system::Config& config, const Arguments& a) {
   Random random(2, "queries");

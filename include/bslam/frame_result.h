@@ -66,17 +66,18 @@ struct FrameResult {
   // known. The pose jumps when a loop is closed. Poses of different submaps are unrelated; after submaps were merged,
   // `submap` of later frames may differ for the same place.
   Pose T_world_cam0, T_world_body;
-  Scale scale = Scale::kMetric;  // of the map, and so the unit of length of all poses and velocities; if tracking
-  int submap = -1;               // id of the first keyframe of the submap of these poses
+  // Scale of the map, which determines the unit of length of all poses and velocities. Valid if tracking.
+  Scale scale = Scale::kMetric;
+  int submap = -1;  // id of the first keyframe of the submap of these poses
   // Covariance of T_world_cam0, if known: of the small motion d, rotation first, in the axes of camera 0, with
   // T_world_cam0(true) = T_world_cam0 exp(d). Relative to the first keyframe of the submap, or to a loaded map: image
   // noise, the drift of the map and, if the calibration was estimated from the images, its remaining error, such as
-  // that of the scale of the baselines. A given calibration counts as exact after the images of some eight keyframes
+  // that of the scale of the baselines. A given calibration is taken as exact after the images of about eight keyframes
   // have not contradicted it, or if calibration.refine is false; until then, the covariance contains the error that it
   // may have. The standard deviations of the position of camera 0 along its own axes are the square roots of elements
   // 21, 28 and 35. Nullopt in the first frame of a map.
   std::optional<Covariance6> covariance;
-  // Of the body frame, in its own axes: the mean since the previous frame; nullopt if that has no pose.
+  // Velocity of the body frame in its own axes, averaged since the previous frame; nullopt if that frame has no pose.
   std::optional<Velocity> velocity;
 
   // The odometry pose (the `odom` frame of ROS REP 105): continuous, since corrections of the map do not change it, and
@@ -88,14 +89,14 @@ struct FrameResult {
   int unique_features = 0;            // number of features of all cameras; features matched between cameras count once
   int matched_features = 0;           // unique features observed by several cameras
 
-  // The frame became a keyframe. Keyframes that are created of a frame after its call of System::process are reported
-  // by Callbacks::keyframe.
+  // The frame became a keyframe. A frame can also become a keyframe after its call of System::process has returned;
+  // Callbacks::keyframe reports that.
   bool keyframe = false;
   int keyframe_id = -1;      // its id if it became a keyframe, otherwise the reference keyframe; -1 if none
   bool relocalised = false;  // tracking was recovered by place recognition
-  // The initial map was wrong: it was up to scale, and the rig was lost in it soon after, or the cameras that tell its
-  // scale contradicted it. All poses and keyframes reported so far are withdrawn, and the map is empty. A new one will
-  // be initialised; ids of keyframes are not used again.
+  // The initial map was wrong: it was up to scale, and the rig was lost in it soon after, or the cameras that determine
+  // its scale contradicted it. All poses and keyframes reported so far are invalid, and the map is empty. A new one
+  // will be initialised; ids of keyframes are not used again.
   bool map_withdrawn = false;
 
   std::vector<StageTime> stages;

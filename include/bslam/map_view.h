@@ -26,7 +26,7 @@ class BSLAM_EXPORT MapView {
  public:
   struct Keyframe {
     int id = -1;               // unique within a run, also after removal
-    std::int64_t time_ns = 0;  // of its frame, in the clock of the recording
+    std::int64_t time_ns = 0;  // time of its frame, by the clock of the recording
     // Pose of camera 0 of the rig that recorded it, in the world frame of its submap; metres if scale() is metric.
     Pose T_world_cam0;
     int parent = -1;  // id of its parent in the submap's spanning tree; -1 for the root

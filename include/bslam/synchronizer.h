@@ -34,17 +34,17 @@ struct DroppedImage {
 };
 
 struct SyncOptions {
-  // Maximum time difference within a bundle; must be less than half an image interval. If a camera always captures at
-  // the same time relative to camera 0, it is at least a tenth of the interval of camera 0.
+  // Maximum time difference within a bundle; must be less than half an image interval. For cameras with a constant
+  // delay relative to camera 0, at least a tenth of the interval of camera 0 is used.
   double tolerance_s = 0.002;
   // How long a bundle waits for a missing image, in time stamps of other images. It is checked when an image arrives,
   // so the delay may be one image interval longer, and a bundle waits as long as no camera delivers.
   double max_wait_s = 0.1;
   double reorder_s = 0;       // maximum time difference between images of one camera that arrive out of order
   double silent_after_s = 1;  // a camera without an image for this long is ignored until it delivers again
-  // An image that is farther ahead of all others than this, and than four intervals of its camera, is dropped unless
-  // the next two of the camera confirm its clock. One that is ahead by less makes all images up to its time too late.
-  // Clocks that go back are not followed: create a new Synchronizer then, and a new System.
+  // An image that is ahead of all others by more than this time and more than four intervals of its camera is dropped,
+  // unless the next two images of the camera confirm its clock. After an image that is ahead by less, all images with
+  // earlier times are too late. Clocks that go back are not followed: create a new Synchronizer then, and a new System.
   double max_ahead_s = 1;
   // Maximum number of waiting images per camera; if it is exceeded, the oldest bundle is completed without its missing
   // images.
@@ -68,11 +68,10 @@ struct SyncCounts {
 // Images are grouped by the same rule as recorded data sets, and every image belongs to exactly one bundle. Each image
 // of camera 0 defines a bundle, to which the nearest image of every other camera within the tolerance belongs. The
 // remaining images form bundles among themselves: the earliest defines one, to which the images of other cameras within
-// the tolerance after it belong. A camera that always captures at the same time relative to camera 0, give or take a
-// tenth of the interval of camera 0, is grouped as if it captured together with it, also if that is between two images
-// of camera 0, as of two cameras that take turns; the tolerance is at least this tenth then. This holds as soon as
-// about five images of each have shown it, and again after the time has changed. A recording shows it from its first
-// image on.
+// the tolerance after it belong. A camera with a constant delay relative to camera 0 (to within a tenth of the interval
+// of camera 0) is grouped as if it captured together with camera 0, even if the delay is half an interval, as for two
+// cameras that are triggered alternately. The tolerance is then at least that tenth. Live, the delay is known after
+// about five images of each camera, and again after it has changed; in a recording it is known from the first image on.
 //
 // A bundle is ready when no missing image can be expected for it: each camera has delivered a later image, is not due
 // yet according to its rate, is silent, or max_wait_s has passed. All times are time stamps of images, never of the
@@ -92,8 +91,8 @@ class BSLAM_EXPORT Synchronizer {
 
   // Adds an image of one camera. Its pixels are shared if it has an `owner`, otherwise copied. Success does not mean
   // that the image will be in a bundle, see DropReason. Errors: a camera index out of range, no data, a size that
-  // differs from the calibration, a stride smaller than the width, a time beyond +-4e18 ns, a call after close(); those
-  // of on_drop, after which the image is taken all the same.
+  // differs from the calibration, a stride smaller than the width, a time beyond +-4e18 ns, a call after close(); an
+  // exception of on_drop, in which case the image is accepted nevertheless.
   Status push(std::size_t camera, const CameraImage& image);
 
   // Returns the next bundle if one is ready.
@@ -102,8 +101,8 @@ class BSLAM_EXPORT Synchronizer {
   // Waits for the next bundle. Returns nullopt when the synchroniser is closed and all bundles were fetched.
   std::optional<ImageBundle> wait();
 
-  // Declares that no images follow: all waiting images become bundles, whose number is not limited. Errors: those of
-  // on_drop alone, after which it is closed all the same.
+  // Declares that no images follow: all waiting images become bundles, whose number is not limited. Errors: only an
+  // exception of on_drop, in which case the synchroniser is closed nevertheless.
   Status close();
 
   SyncCounts counts() const;

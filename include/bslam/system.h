@@ -62,19 +62,21 @@ struct Startup {
   std::filesystem::path map = {};         // saved map to continue after relocalising in it; empty: a new map
   std::filesystem::path vocabulary = {};  // bslam or DBoW2 text format; empty: the vocabulary shipped with bslam
   bool place_recognition = true;          // false: no loop closing; a lost rig is only recovered near the place of loss
-  // Minimum number of latest frames that trajectory() returns. Older frames are discarded, so that only the map
-  // determines the memory. 0: all frames are kept.
+  // Minimum number of latest frames that trajectory() returns. Older frames are discarded, so that memory grows with
+  // the map only. 0: all frames are kept.
   std::size_t history_frames = 0;
   Callbacks callbacks = {};
 };
 
 // Owns the map and the threads. Only one thread at a time may call process(), finish() and trajectory(); a call during
 // another one returns an error. map(), save_map() and interrupt() may be called from any thread at any time. The
-// destructor stops background work; no other call may be in progress then, and none may follow a move from the System.
+// destructor stops background work; no other call may be in progress then. A System that was moved from must not be
+// used.
 class BSLAM_EXPORT System {
  public:
   // Errors: inconsistent settings (localize_only without a map, calibration.refine=true without final_adjustment); a
-  // map or vocabulary that cannot be read; a map without keyframes, or of another feature pyramid or vocabulary.
+  // map or vocabulary that cannot be read; a map that has no keyframes or was made with a different feature pyramid or
+  // vocabulary.
   static Result<System> create(const Rig& rig, const Config& config, Startup startup = {});
   System(System&& other) noexcept;
   System& operator=(System&& other) noexcept;

@@ -1,4 +1,4 @@
-"""`python -m bslam` is the program."""
+"""Runs the program `bslam`: `python -m bslam ARGUMENTS`."""
 
 import os
 import sys

@@ -116,8 +116,8 @@ class Client:
             images: by name of the camera, of any of the cameras: pixels, an encoded image, or the path of one.
 
         Raises:
-            ServiceError: the server has refused the request, such as an image of another size than its camera has, or
-                is busy (`status` 503), or does not answer.
+            ServiceError: the server has refused the request, such as an image whose size differs from that of its
+                camera, or is busy (`status` 503), or does not answer.
         """
         content_type, body = _form(images)
         answer = json.loads(self._request("POST", "/v1/localise", body, {"Content-Type": content_type}))

@@ -26,7 +26,7 @@ using Rows3 = Array<double, -1, 3>;  // (n, 3)
 using Rows8 = Array<double, -1, 8>;  // (n, 8)
 using Integers = Array<std::int64_t, -1>;
 
-// Returns an array that owns `values`, of which there must be as many as the shape says. It copies nothing.
+// Returns an array that owns `values`, without a copy. The number of values must be the product of `shape`.
 template <class ArrayType, class T>
 ArrayType make_array(std::vector<T> values, std::initializer_list<std::size_t> shape) {
   auto owned = std::make_unique<std::vector<T>>(std::move(values));

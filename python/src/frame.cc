@@ -42,7 +42,7 @@ std::string text_of(const Frame& f) {
 
 void bind_camera_status(nb::module_& module) {
   using C = CameraResult;
-  nb::class_<C>(module, "CameraStatus", "What one camera contributed to a frame.")
+  nb::class_<C>(module, "CameraStatus", "State and number of keypoints of one camera in a frame.")
       .def_prop_ro(
           "state", [](const C& c) { return to_string(c.state); }, "ok, degraded or out (not used).")
       .def_ro("reason", &C::reason,
@@ -66,7 +66,7 @@ void bind_poses(nb::class_<Frame>& frame) {
           "(4, 4) pose of the body frame of the calibration in the map; None unless tracking.")
       .def_prop_ro(
           "T_odom_cam0", [](const Frame& f) { return matrix_of(f.T_odom_cam0); }, nb::rv_policy::move,
-          "(4, 4) odometry pose of camera 0: continuous, no correction of the map changes it; constant while lost.")
+          "(4, 4) odometry pose of camera 0: not changed by corrections of the map; constant while lost.")
       .def_prop_ro(
           "T_odom_body", [](const Frame& f) { return matrix_of(f.T_odom_body); }, nb::rv_policy::move,
           "(4, 4) odometry pose of the body frame.")
@@ -75,8 +75,8 @@ void bind_poses(nb::class_<Frame>& frame) {
           "(4, 4) with T_world_cam0 = T_map_odom @ T_odom_cam0.")
       .def_prop_ro(
           "covariance", covariance, nb::rv_policy::move,
-          "(6, 6) covariance of T_world_cam0, rotation first (rad^2, rad m, m^2), in the axes of camera 0: of d "
-          "in T_world_cam0(true) = T_world_cam0 exp(d). None if unknown.")
+          "(6, 6) covariance of the error d in T_world_cam0(true) = T_world_cam0 exp(d), rotation first (rad^2, rad m, "
+          "m^2), in the axes of camera 0. None if unknown.")
       .def_prop_ro(
           "angular_velocity", [](const Frame& f) { return velocity(f, &Velocity::angular); }, nb::rv_policy::move,
           "(3,) rad/s, of the body frame in its own axes; None if unknown.")
@@ -109,7 +109,7 @@ void bind_frame(nb::module_& module) {
       .def_ro("keyframe", &Frame::keyframe, "Whether the frame became a keyframe.")
       .def_ro("keyframe_id", &Frame::keyframe_id, "Its id, otherwise that of the reference keyframe; -1 if none.")
       .def_ro("relocalised", &Frame::relocalised, "Whether tracking was recovered by place recognition.")
-      .def_ro("map_withdrawn", &Frame::map_withdrawn, "The first map was wrong: all poses so far are withdrawn.")
+      .def_ro("map_withdrawn", &Frame::map_withdrawn, "The first map was wrong: all poses so far are invalid.")
       .def_prop_ro("stages", stages, "Wall time by stage, in milliseconds.")
       .def_ro("total_ms", &Frame::total_ms, "Wall time from the call to the pose, in milliseconds.")
       .def("__repr__", text_of);

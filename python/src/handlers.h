@@ -10,13 +10,14 @@
 
 namespace bslam::python {
 
-// Must not move while the callbacks exist, which refer to it. All members are used with the interpreter's lock only.
+// Must not be moved while the callbacks exist, because they refer to it. All members are only used while holding the
+// GIL.
 class Handlers {
  public:
   // Each is a function or None.
   nanobind::object keyframe, loop, camera, log;
 
-  // Functions for System::create(), which take the interpreter's lock.
+  // Functions for System::create(); each acquires the GIL.
   Callbacks callbacks();
   // Throws the first exception that one of the functions has raised since the last call.
   void rethrow();

@@ -87,7 +87,7 @@ void bind_keyframes(nb::class_<MapView>& map) {
 void bind_landmarks(nb::class_<MapView>& map) {
   using Landmark = MapView::Landmark;
   map.def_prop_ro("landmarks", landmarks, nb::rv_policy::move,
-                  "(m, 3) positions in the world frames of their submaps, in metres.")
+                  "(m, 3) positions in the world frames of their submaps, in metres if the scale is metric.")
       .def_prop_ro(
           "landmark_ids", [](const MapView& m) { return column(m.landmarks(), &Landmark::id); }, nb::rv_policy::move,
           "(m,) ids of the landmarks, ascending; all arrays of landmarks have this order.")
@@ -107,7 +107,8 @@ void bind_map(nb::module_& module) {
                           "array is a new copy: keep it instead of asking again in a loop.");
   map.def_static(
          "load", [](const std::filesystem::path& path) { return value_of(MapView::load(path)); }, nb::arg("path"),
-         nb::call_guard<nb::gil_scoped_release>(), "Reads a saved map. Saving numbers keyframes and landmarks anew.")
+         nb::call_guard<nb::gil_scoped_release>(),
+         "Reads a saved map. Keyframes and landmarks were renumbered when it was saved.")
       .def_prop_ro("version", &MapView::version, "Incremented by every change; 0 for a loaded map.")
       .def_prop_ro(
           "scale", [](const MapView& m) { return to_string(m.scale()); },

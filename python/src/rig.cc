@@ -84,7 +84,7 @@ void bind_camera(nb::module_& module) {
           nb::kw_only(), nb::arg("model"), nb::arg("resolution"), nb::arg("intrinsics"),
           nb::arg("distortion") = std::vector<double>(), nb::arg("T_body_cam") = nb::none(), nb::arg("name") = "",
           nb::arg("time_offset_s") = 0.0, nb::arg("rolling_shutter_readout_s") = 0.0, nb::arg("mask") = nb::none(),
-          "Creates a calibration, with the names of the rig file.\n\n"
+          "Creates a calibration. Names are those of the rig file of bslam.\n\n"
           "Args:\n"
           "    model: pinhole, pinhole-radtan, kannala-brandt, ucm, eucm, double-sphere or fov.\n"
           "    resolution: (width, height) in pixels.\n"
@@ -93,7 +93,7 @@ void bind_camera(nb::module_& module) {
           "    T_body_cam: (4, 4), maps the camera to the body, metres; default: the identity.\n"
           "    name: unique in the rig; default: cam0, cam1, ... by index.\n"
           "    time_offset_s: true time = stamp + offset.\n"
-          "    rolling_shutter_readout_s: from the exposure of the first row to that of the last.\n"
+          "    rolling_shutter_readout_s: seconds from the exposure of the first row to that of the last.\n"
           "    mask: uint8 (height, width); 0 marks pixels to ignore in all images.")
       .def_ro("name", &C::name, "Name, unique in the rig.")
       .def_ro("model", &C::model, "pinhole, pinhole-radtan, kannala-brandt, ucm, eucm, double-sphere or fov.")

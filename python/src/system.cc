@@ -21,7 +21,7 @@ namespace {
 
 using Path = std::filesystem::path;
 
-// A System with the Python functions that it calls. All calls that take time release the interpreter's lock.
+// A System with the Python functions that it calls. All calls that take time release the GIL.
 class PythonSystem {
  public:
   PythonSystem(const Rig& rig, const Config& config, Startup startup, Handlers handlers);
@@ -151,7 +151,7 @@ void bind_constructor(nb::class_<PythonSystem>& system) {
               "on_loop: collections.abc.Callable[[LoopEvent], object] | None = None, "
               "on_camera: collections.abc.Callable[[CameraEvent], object] | None = None, "
               "on_log: collections.abc.Callable[[str, str], object] | None = None) -> None"),
-      "Creates a system. The names are those of `bslam run`.\n\n"
+      "Creates a system. Arguments have the names of the options of `bslam run`.\n\n"
       "Args:\n"
       "    rig: the calibrated cameras.\n"
       "    mode: sequential, lagged or parallel; default: that of `settings` or `config`, otherwise parallel.\n"
@@ -165,8 +165,8 @@ void bind_constructor(nb::class_<PythonSystem>& system) {
       "    history_frames: minimum number of latest frames in trajectories, for long runs; 0: all.\n"
       "    on_keyframe, on_loop, on_camera: called with a KeyframeEvent, LoopEvent or CameraEvent.\n"
       "    on_log: called with a level (\"info\" or \"warning\") and a line of text.\n\n"
-      "Functions are called by the thread that is in process() or finish(), before it returns; an exception of one of\n"
-      "them is raised by that call.");
+      "The functions are called by the thread that is in process() or finish(), before it returns. If one of them\n"
+      "raises an exception, that call raises it.");
 }
 
 void bind_processing(nb::class_<PythonSystem>& system) {
@@ -178,11 +178,11 @@ void bind_processing(nb::class_<PythonSystem>& system) {
                   "masks: collections.abc.Sequence[numpy.typing.NDArray[numpy.uint8] | None] | None = None) -> Frame"),
           "Estimates the pose of the rig for images taken at the same time.\n\n"
           "The images are raw (neither undistorted nor rectified). They are read without a copy during the call, with\n"
-          "the interpreter unlocked, so do not change them meanwhile; afterwards their memory may be used again.\n\n"
+          "the GIL released, so do not change them meanwhile; afterwards their memory may be used again.\n\n"
           "Args:\n"
           "    stamps: middle of each exposure in nanoseconds, or one time for all images.\n"
-          "    images: one per camera of the rig, in its order: uint8 of shape (height, width), whose rows may be\n"
-          "        any distance apart; None where there is no image.\n"
+          "    images: one per camera of the rig, in its order: uint8 of shape (height, width) with any row stride\n"
+          "        and contiguous pixels in a row; None where there is no image.\n"
           "    masks: uint8 like the images; 0 marks pixels to ignore. None where there is no mask.\n\n"
           "Returns:\n"
           "    The result. A lost frame is a result, not an error.")
@@ -190,7 +190,7 @@ void bind_processing(nb::class_<PythonSystem>& system) {
            "Waits for background work and adjusts the whole map. To be called once, after the last frame.")
       .def(
           "interrupt", [](PythonSystem& s) { (*s).interrupt(); },
-          "Makes the current call, in another thread, and finish() return soon; background work ends for good.");
+          "Makes the current call in another thread and finish() return soon. Background work is not resumed.");
 }
 
 }  // namespace
@@ -213,13 +213,12 @@ void bind_system(nb::module_& module) {
             return rows_of(value_of((*s).trajectory(frame_named(frame))));
           },
           nb::arg("frame") = "cam0",
-          "Returns the poses of all frames that have one, corrected by the current map, (n, 8): t, x, y, z, qx, qy, "
-          "qz,\n"
-          "qw in seconds and metres, for the submap with the most frames.\n\n"
+          "Returns the poses of all frames that have one, corrected by the current map, for the submap with the most\n"
+          "frames: (n, 8) with t, x, y, z, qx, qy, qz, qw in seconds and metres.\n\n"
           "Args:\n"
           "    frame: cam0 (camera 0) or body (the body frame of the calibration).")
       .def("trajectories", trajectories, nb::arg("frame") = "cam0",
-           "Returns trajectory() of all submaps, that with the most frames first.")
+           "Returns trajectory() of all submaps; the submap with the most frames is first.")
       .def("save_trajectory", save_trajectory, nb::arg("path"), nb::arg("frame") = "cam0",
            "Writes trajectory() as TUM file, with times that are exact to the nanosecond.");
 }

@@ -14,8 +14,8 @@
 
 namespace bslam_ros {
 
-// Whether the data is a JPEG or a PNG up to its end: a decoder would fill the missing part of an image that is cut off
-// with grey. Zeros may follow, with which some drivers fill their buffers.
+// Whether the data is a JPEG or a PNG up to its end: a decoder would fill the missing part of a truncated image with
+// grey. Zeros may follow, with which some drivers fill their buffers.
 inline bool is_whole_image(const std::vector<std::uint8_t>& data) {
   using Bytes = std::vector<std::uint8_t>;
   const auto end = std::find_if(data.rbegin(), data.rend(), [](std::uint8_t byte) { return byte != 0; });

@@ -21,8 +21,9 @@ double sum_bound(double bound, int keypoints) {
   return bound * quantile(2.0 * keypoints) / quantile(2.0);
 }
 
-// Outliers are classified per observation, that is for all keypoints of a feature together: judged one by one, the
-// probability that one of them exceeds its bound by chance would grow with the number of cameras.
+// Outliers are classified per observation, that is for all keypoints of a feature together. If keypoints were
+// classified one by one, the probability that one of them exceeds its bound by chance would grow with the number of
+// cameras.
 std::vector<ObservationSource> outlier_observations(const BundleProblem& flat, double bound) {
   const std::vector<double> chi2 = solver::squared_errors(flat.problem);
   std::vector<ObservationSource> bad;
@@ -65,8 +66,8 @@ map::SetPoses poses_of(const map::BundledMap& map, const BundleProblem& flat) {
   return poses;
 }
 
-// The round without robust kernel, on the inliers, with a variance for each landmark. Returns the uncertainties that
-// the selection asks for.
+// The round without robust kernel, on the inliers, with a variance for each landmark. Returns the uncertainties
+// requested by the selection.
 PoseUncertainties adjust_inliers(const map::BundledMap& map, const Selection& selection,
                                  const AdjustmentOptions& options, BundleProblem& flat, std::stop_token stop) {
   const std::vector<double> chi2 = solver::squared_errors(flat.problem);

@@ -13,7 +13,7 @@ namespace bslam::adjustment {
 struct AdjustmentOptions {
   int robust_iterations = 4;                    // with Huber kernel, before outliers are classified
   int final_iterations = 5;                     // without robust kernel, on the inliers
-  double relative_decrease = 1e-4;              // of the cost; smaller means converged
+  double relative_decrease = 1e-4;              // converged if a step decreases the cost by a smaller fraction
   double outlier_chi2 = solver::kChi2TwoDof95;  // squared normalised error above which an observation is removed
   // Number of observations of a landmark that together carry the information of one: errors of a landmark in successive
   // images are similar. For the covariances of the poses only.
@@ -29,7 +29,7 @@ struct AdjustmentOptions {
     visitor("outlier_chi2", self.outlier_chi2, Range{0.1, 1e6}, "",
             "squared normalised error above which an observation is removed");
     visitor("correlated_observations", self.correlated_observations, Range{1, 1e4}, "",
-            "number of observations that carry the information of one, for the covariances of poses");
+            "number of observations that carry as much information as one, for the covariances of poses");
   }
 };
 

@@ -27,7 +27,7 @@ namespace bslam::adjustment {
 
 using PoseUncertainties = std::vector<std::pair<KeyframeId, geometry::PoseUncertainty>>;
 
-// Positions of the selection's keyframes `with_uncertainty` in the poses of the problem.
+// Indices, among the poses of the problem, of the selection's keyframes `with_uncertainty`.
 std::vector<int> poses_with_uncertainty(const Selection& selection, const BundleProblem& flat);
 
 // solver::BundleOptions::fixed_effects, relative to the anchor: F_f - Ad(T_fa) F_a of each fixed keyframe f. An error
@@ -43,8 +43,8 @@ PoseUncertainties pose_uncertainties(const map::BundledMap& map, const BundlePro
                                      std::span<const std::optional<geometry::PoseUncertainty>> marginals,
                                      double correlated_observations);
 
-// The uncertainties of the keyframes that have an effect of the calibration's error, without it: the calibration has
-// been compared with images and counts as exact.
+// The uncertainties without the error of the calibration, for the keyframes whose uncertainty includes one. Used once
+// the calibration has been compared with the images and is taken as exact.
 PoseUncertainties without_calibration(const map::BundledMap& map);
 
 }  // namespace bslam::adjustment

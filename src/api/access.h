@@ -1,4 +1,4 @@
-// The only way from outside to what a public class hides.
+// Gives the library access to the hidden implementations of the public classes.
 #pragma once
 
 #include <memory>
@@ -12,7 +12,7 @@ struct Access {
     return *object.impl_;
   }
 
-  // A Rig or MapView of these members of its Impl.
+  // Creates a Rig or MapView whose Impl has these members.
   template <class T, class... Members>
   static T make(Members&&... members) {
     using Impl = typename T::Impl;

@@ -1,4 +1,4 @@
-// Checks bundles passed by the caller and converts them to bundles of the estimator.
+// Checks image bundles passed by the caller and converts them to the internal type.
 #pragma once
 
 #include <bslam/image_bundle.h>
@@ -19,8 +19,8 @@ class BundleReader {
  public:
   explicit BundleReader(const camera::Rig& rig) : rig_(rig), last_camera_ns_(rig.size()) {}
 
-  // Returns the same images without copying their pixels, with the time offsets of the rig applied and the number of
-  // the next frame. Errors: those of bslam::System::process about a bundle; such a bundle does not change the reader.
+  // Returns the same images without copying their pixels. Applies the time offsets of the rig and assigns the next
+  // frame id. Errors: those that bslam::System::process documents for a bundle. After an error the reader is unchanged.
   Result<image::ImageBundle> read(const ImageBundle& bundle);
 
  private:

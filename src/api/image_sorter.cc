@@ -68,8 +68,8 @@ void ImageSorter::update_times(std::size_t c, TimeNs time_ns) {
   newest_ns_ = std::max(newest_ns_.value_or(time_ns), time_ns);
 }
 
-// Learns the phases of the cameras from their newest images. New ones hold as soon as no waiting image would be too
-// late because of them.
+// Estimates the delays of the cameras relative to camera 0 from their newest images. New delays are used as soon as
+// they make no waiting image too late.
 void ImageSorter::update_phases() {
   if (recent_[0].empty()) return;
   image::CapturePhases phases = image::capture_phases(recent_, tolerance_, phases_.cameras);
@@ -80,7 +80,7 @@ void ImageSorter::update_phases() {
       return;
   }
   phases_ = std::move(phases);
-  std::ranges::fill(anchor_, std::nullopt);  // which the former phases have made
+  std::ranges::fill(anchor_, std::nullopt);  // determined with the former delays
 }
 
 // Returns true if the image was added to the waiting images of its camera.
@@ -95,7 +95,7 @@ bool ImageSorter::accept(std::size_t c, TimeNs time_ns, const CameraImage& image
   update_times(c, time_ns);
   if (last_bundle_ns_ && in_phase(c, time_ns) <= *last_bundle_ns_) return drop(DropReason::kTooLate);
   if (camera.last_ns && time_ns <= *camera.last_ns)
-    return drop(DropReason::kTooLate);  // although its phase has changed
+    return drop(DropReason::kTooLate);  // its delay relative to camera 0 has changed
   if (belongs_to_anchor(c, time_ns)) return drop(DropReason::kTooLate);
   const auto place = std::ranges::upper_bound(camera.waiting, time_ns, {}, &WaitingImage::time_ns);
   camera.waiting.insert(place, {time_ns, image});
@@ -122,8 +122,8 @@ TimeNs ImageSorter::complete_until(std::size_t c) const {
   return in_phase(c, std::max(next_due, timeout));
 }
 
-// Groups all waiting images. The anchor is grouped with them, since images that are nearest to its image of camera 0
-// join no other one.
+// Groups all waiting images. The anchor bundle is included, because images that are nearest to its image of camera 0
+// must not join another bundle.
 image::FrameGroups ImageSorter::grouped() const {
   std::vector<std::vector<TimeNs>> times(cameras_.size());
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
@@ -212,8 +212,8 @@ void ImageSorter::emit(const image::GroupedFrame& frame, std::vector<ImageBundle
   }
 }
 
-// Drops images whose place in another bundle was taken by a later, nearer one, after a later bundle was complete, or
-// which were captured before the last bundle although they follow it in phase with camera 0.
+// Drops images that are too late: a nearer image of their camera has replaced them in their bundle after a later bundle
+// was complete, or they were captured before the last bundle although, corrected for the delay, they follow it.
 void ImageSorter::drop(const image::GroupedFrame& frame, std::vector<DroppedImage>& dropped) {
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
     if (frame.images[c] >= 0) dropped.push_back({c, take(c, frame.images[c]).time_ns, DropReason::kTooLate});

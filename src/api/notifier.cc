@@ -72,7 +72,7 @@ void Notifier::report_map(const system::System& system) {
   if (callbacks_.map) callbacks_.map(make_map_view(std::move(map)));
 }
 
-// `reported`: the frame whose keyframe is reported with its result.
+// `reported`: the frame whose keyframe is already reported with its result.
 void Notifier::report_created_keyframes(const system::System& system, FrameId reported) {
   if (!callbacks_.keyframe) return;
   for (const tracking::FrameRecord& record : system.created_keyframes()) {

@@ -51,7 +51,7 @@ Error moved_from(const char* name) {
 struct Resources {
   system::Resources for_system;
   std::uint64_t vocabulary = 0;  // its id; 0 = none
-  std::string map_warning;       // what is wrong with the loaded map
+  std::string map_warning;       // reason why the poses of the loaded map cannot be relied on; may be empty
 };
 
 Result<Resources> load_resources(const Rig& rig, const system::Config& config, const Startup& startup) {
@@ -97,7 +97,7 @@ struct System::Impl {
   api::BundleReader reader;
   api::Notifier notifier;
   bool finished = false;
-  std::optional<Error> failure;  // what ended the run
+  std::optional<Error> failure;  // the error that ended the run
   mutable std::atomic<bool> call_in_progress = false;
 };
 

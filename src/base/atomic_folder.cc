@@ -26,7 +26,7 @@ bool is_below(const fs::path& name) {
   return !name.empty() && normal.is_relative() && normal.has_filename() && normal != "." && *normal.begin() != "..";
 }
 
-// Moves files into an existing folder. What was moved can be moved back.
+// Moves files into an existing folder, and can move them back.
 class Replacement {
  public:
   // Files of `to` that are replaced are kept in the new folder `aside` until finish().

@@ -8,7 +8,8 @@
 
 namespace bslam {
 
-// A folder that is filled beside its place and moved there by commit(). Without commit() nothing remains of it.
+// A folder that is written under a temporary name next to its destination `place` and renamed by commit(). Without
+// commit() nothing remains of it.
 class AtomicFolder {
  public:
   // Creates the temporary folder. Parents of `place` are created. Errors: `place` is a file; it is a folder that is not
@@ -17,15 +18,16 @@ class AtomicFolder {
 
   AtomicFolder(AtomicFolder&& other) noexcept;
   AtomicFolder& operator=(AtomicFolder&&) = delete;
-  ~AtomicFolder();  // removes what was not committed
+  ~AtomicFolder();  // removes the temporary folder if it was not committed
 
   // Writes a file of the folder; folders in `name` are created. Errors: `name` is absolute or leads out of the folder;
-  // as write_atomically.
+  // those of write_atomically.
   Status write(const std::filesystem::path& name, std::string_view bytes) const;
 
-  // Moves the folder to its place by one rename. If a folder with files is there, the new files are moved into it one
-  // by one, since its other files may not be ours: they remain. After an error, all files of the folder are as before;
-  // only if the program is killed meanwhile, some are new and some are old (in a folder beside it, `PLACE.part-*`).
+  // Moves the folder to its place by one rename. If the destination is a folder with files, the new files are moved
+  // into it one by one and its other files remain. After an error, all files of the folder are as before. Only if the
+  // program is killed during the move can some files be new and the replaced ones be in `PLACE.part-*` next to the
+  // folder.
   Status commit();
 
  private:

@@ -10,8 +10,8 @@
 
 namespace bslam {
 
-// The bytes of a regular file, unmapped with the last copy. The file must not be changed or cut off while it is mapped;
-// replacing it by renaming another one is no change.
+// The bytes of a regular file, unmapped when the last copy is destroyed. The file must not be modified or truncated
+// while it is mapped. Replacing it by renaming another file onto its name is allowed.
 class MappedFile {
  public:
   // Errors: the file cannot be opened or mapped, is not a regular file, or is larger than `max_bytes`.
@@ -19,8 +19,8 @@ class MappedFile {
 
   std::string_view bytes() const { return bytes_; }
   const std::shared_ptr<const void>& owner() const { return owner_; }
-  // Tells the system that the pages which were read so far are not needed soon: they do not count as memory of the
-  // process until they are read again.
+  // Tells the operating system that the pages read so far are not needed soon (madvise). They leave the resident memory
+  // of the process until they are read again.
   void release() const;
 
  private:

@@ -1,5 +1,4 @@
-// Sizes of what containers hold, for reports of memory: of the memory they have reserved, without the bookkeeping of
-// the heap.
+// Memory of containers, for memory reports: the capacity that they have reserved, without the overhead of the heap.
 #pragma once
 
 #include <cstddef>
@@ -22,7 +21,7 @@ class MemoryCount {
     return piece != nullptr && counted_.insert(piece).second ? bytes : 0;
   }
 
-  // What a shared pointer allocates beside its value.
+  // Bytes of the control block of a shared pointer.
   static constexpr std::size_t kShared = 2 * sizeof(void*);
 
  private:

@@ -53,7 +53,7 @@ class SharedArray {
   std::shared_ptr<const void> owner_;  // keeps the elements alive
   const T* data_ = nullptr;
   std::size_t size_ = 0;
-  bool borrowed_ = false;  // the owner has not been made for these elements
+  bool borrowed_ = false;  // the elements belong to another owner, such as a mapped file
 };
 
 }  // namespace bslam

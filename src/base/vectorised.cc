@@ -3,7 +3,7 @@
 namespace bslam {
 namespace {
 
-// What the compiler may use everywhere.
+// The instruction set that the compiler may use in all functions.
 constexpr std::string_view kBaseline =
 #if defined(__AVX2__)
     "AVX2";
@@ -19,7 +19,7 @@ constexpr std::string_view kBaseline =
 
 std::string_view instruction_set() {
 #ifdef BSLAM_SEVERAL_VERSIONS
-  if (__builtin_cpu_supports("avx2")) return "AVX2";  // which is what chooses the version of BSLAM_VECTORISED
+  if (__builtin_cpu_supports("avx2")) return "AVX2";  // the same test selects the version of BSLAM_VECTORISED functions
 #endif
   return kBaseline;
 }

@@ -12,7 +12,7 @@ namespace {
 
 using Figure = std::function<std::optional<double>(const RunMeasurement&)>;
 
-// Sorted values of the runs that have one.
+// The values of a figure in all runs that have it, sorted.
 std::vector<double> values(const std::vector<RunMeasurement>& runs, const Figure& figure) {
   std::vector<double> sorted;
   for (const RunMeasurement& run : runs) {
@@ -32,7 +32,7 @@ std::string median_text(const std::vector<RunMeasurement>& runs, const Figure& f
   return sorted.empty() ? "-" : fmt::format("{:.{}f}", median(sorted), decimals);
 }
 
-// Median, best, worst and mean; a single value alone.
+// Text with median, best, worst and mean; only the value if there is one.
 std::string spread_text(const std::vector<RunMeasurement>& runs, const Figure& figure) {
   const auto sorted = values(runs, figure);
   if (sorted.empty()) return "-";

@@ -11,14 +11,14 @@ namespace bslam::benchmark {
 
 struct SequenceResult {
   Sequence sequence;
-  std::vector<RunMeasurement> runs;  // those that have ended
+  std::vector<RunMeasurement> runs;  // finished runs
   // The first two runs of a deterministic mode gave the same trajectory: their seeds had no effect, and further runs,
   // which would be copies, were left out.
   bool identical = false;
 };
 
 struct BenchmarkConditions {
-  std::string version;    // of the program
+  std::string version;    // version of the program
   std::string processor;  // empty if unknown
   std::string command;
   int runs = 1;          // requested for each sequence

@@ -11,11 +11,10 @@
 namespace bslam::benchmark {
 
 // RMSE of the positions in metres after rigid alignment, over all frames with a pose.
-//   P: the path of camera 0 against the released positions of the body. Since the camera is not at the body's origin,
-//   even
-//      a perfect path has an error of some centimetres. Earlier publications used this protocol.
-//   T: the path of the camera, moved to the body with the calibration, against the corrected truth if there is one,
-//      otherwise against the released one. If the truth contains poses of camera 0, the path is compared directly.
+//   P: the path of camera 0 against the positions of the body in the ground truth of the data set. The camera is not at
+//      the body's origin, so that even a perfect path has an error of some centimetres. Used by earlier publications.
+//   T: the path of camera 0, converted to the body with the calibration, against the corrected ground truth if there is
+//      one, otherwise against that of the data set. Ground truth of camera 0 is compared directly.
 struct RunMeasurement {
   int run = 1;               // counted from 1
   std::string failure = {};  // why there is no result; empty if the run succeeded

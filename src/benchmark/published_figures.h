@@ -19,7 +19,7 @@ struct PublishedRow {
   std::string_view system;
   Protocol protocol;
   std::string_view source;
-  bool checked;  // against the source itself; otherwise quoted from memory of the table
+  bool checked;  // true: compared with the source; false: quoted without comparison
   std::array<std::optional<double>, 11> ate_m;
 };
 
@@ -30,7 +30,7 @@ struct PublishedSuite {
   std::span<const PublishedRow> rows;
 };
 
-// The figures of one sequence: those of a row that has one.
+// The errors of one sequence, from the rows that have one for it.
 struct PublishedFigure {
   const PublishedRow* row;
   double ate_m;

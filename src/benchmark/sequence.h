@@ -22,10 +22,10 @@ struct Truth {
 struct Sequence {
   std::string name;  // name of the folder
   std::filesystem::path folder;
-  std::optional<Truth> released;   // as the data set ships it
-  std::optional<Truth> corrected;  // groundtruth_body.tum: recomputed poses of the body, for protocol T
+  std::optional<Truth> released;   // ground truth file of the data set
+  std::optional<Truth> corrected;  // groundtruth_body.tum: recomputed body poses for protocol T (measure_run.h)
   std::optional<std::filesystem::path>
-      rig;  // calibration outside the places where `bslam run` looks: dso/camchain.yaml
+      rig;  // dso/camchain.yaml: a calibration that `bslam run` does not find by itself
 };
 
 // Returns the sequences of a folder in order of their names: the folder itself if it is a sequence, otherwise its

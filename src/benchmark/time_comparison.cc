@@ -9,7 +9,7 @@ namespace {
 
 constexpr const char* kNothing = "-";
 
-// What the clock and the scheduler change a time by, without a change of the program.
+// Differences of times below this are noise of clock and scheduler.
 double resolution_of(std::string_view name) {
   constexpr double kMs = 0.02, kS = 0.02, kMb = 1.0;
   if (name.ends_with("_ms")) return kMs;
@@ -29,7 +29,8 @@ std::string ratio_text(double before, double now) {
   return before > 0 ? fmt::format("{:.3f}", now / before) : kNothing;
 }
 
-// Compares what is in one or both of two lists of names and values: compare(name, before, now), null if it is missing.
+// Calls compare(name, before, now) for every name in one or both of two lists of names and values; null if the value is
+// missing.
 template <class Item, class Name, class Compare>
 void pair_up(const std::vector<Item>& before, const std::vector<Item>& now, const Name& name, const Compare& compare) {
   const auto find = [&](const std::vector<Item>& in, const std::string& wanted) -> const Item* {
@@ -55,7 +56,8 @@ class Comparison {
     out_.figures.push_back(std::move(figure));
   }
 
-  // A count; nullopt if it was not counted or differs between runs, which is a difference if `always`.
+  // Compares a count; nullopt if it was not counted or differs between runs. With `always`, a missing count is a
+  // difference.
   void count(const std::string& name, std::optional<std::int64_t> before, std::optional<std::int64_t> now,
              bool always) {
     const auto shown = [](std::optional<std::int64_t> n) { return n ? std::to_string(*n) : kNothing; };
@@ -127,7 +129,7 @@ TimeComparison compare_times(const TimeReport& before, const TimeReport& now, do
   Comparison comparison(margin, before.conditions.mode == "sequential" && now.conditions.mode == "sequential");
   const auto first = [](const auto& item) { return item.first; };
   pair_up(before.process, now.process, first, [&](const std::string& name, const auto* a, const auto* b) {
-    if (name != "allocations_per_frame")  // which is among the counts
+    if (name != "allocations_per_frame")  // it is already compared as a count
       comparison.time(spoken(name), name, a ? &a->second : nullptr, b ? &b->second : nullptr);
   });
   compare_stages(before, now, comparison);

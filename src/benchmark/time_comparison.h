@@ -11,8 +11,8 @@ namespace bslam::benchmark {
 enum class Change {
   kNone,
   kFaster,
-  kSlower,   // or more memory
-  kDiffers,  // a count; it has no other tolerance than equality
+  kSlower,   // slower, or more memory
+  kDiffers,  // a count differs; counts must be equal
 };
 
 struct ComparedFigure {
@@ -24,13 +24,14 @@ struct ComparedFigure {
 
 struct TimeComparison {
   std::vector<ComparedFigure> figures;
-  std::vector<std::string> notes;  // differences of the conditions that make times incomparable
-  bool worse() const;              // a count differs, or a time is slower
+  // Differences in the conditions, such as another processor, that make the times incomparable.
+  std::vector<std::string> notes;
+  bool worse() const;  // a count differs, or a time is slower
 };
 
-// A time is slower if its median is larger than that before by more than the fraction `margin` and by more than the
-// clock and the scheduler change it by chance, and all runs are slower than all before. Counts are compared if
-// both were measured in sequential mode and were equal in all runs.
+// A time counts as slower if its median is larger than the earlier one by more than the fraction `margin` and by more
+// than clock and scheduler noise, and if every new run is slower than every earlier run. Counts are compared if both
+// were measured in sequential mode and were equal in all runs.
 TimeComparison compare_times(const TimeReport& before, const TimeReport& now, double margin);
 
 report::Table comparison_table(const TimeComparison& comparison);

@@ -1,4 +1,4 @@
-// time.json: written and read.
+// Writes and reads time.json.
 #include <nlohmann/json.hpp>
 
 #include "benchmark/time_report.h"
@@ -13,7 +13,7 @@ constexpr int kSchema = 1;
 
 ordered_json json_of(const Spread& s) { return {{"median", s.median}, {"min", s.min}, {"max", s.max}}; }
 
-// A value in an error message; of a container, only what it is.
+// Text of a value for an error message; only the type of a container.
 std::string shown(const ordered_json& value) { return value.is_structured() ? value.type_name() : value.dump(); }
 
 // Reads a JSON object, and keeps the first error.

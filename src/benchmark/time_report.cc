@@ -17,7 +17,7 @@ std::optional<double> number(const json& summary, const json::json_pointer& at) 
   return summary.at(at).get<double>();
 }
 
-// The figure at a place of all summaries, or nullopt if one does not have it.
+// The figure under a key of all summaries, or nullopt if a summary does not have it.
 std::optional<Spread> spread_at(std::span<const json> summaries, const json::json_pointer& at, double scale = 1.0) {
   std::vector<double> values;
   for (const json& summary : summaries) {

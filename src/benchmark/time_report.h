@@ -20,7 +20,7 @@ struct Spread {
   friend bool operator==(const Spread&, const Spread&) = default;
 };
 
-Spread spread_of(std::vector<double> values);  // of at least one run
+Spread spread_of(std::vector<double> values);  // `values` must not be empty
 
 struct StageTimes {
   std::string name;
@@ -38,33 +38,34 @@ struct VaryingCount {
 
 struct TimeConditions {
   std::string version, data, mode, command;
-  std::string processor, instructions;  // its name, empty if unknown, and the vector instructions in use
+  std::string processor, instructions;  // name of the processor (empty if unknown), and the vector instructions in use
   friend bool operator==(const TimeConditions&, const TimeConditions&) = default;
 };
 
 struct TimeReport {
   TimeConditions conditions;
   int runs = 0;
-  std::vector<std::pair<std::string, Spread>> process;     // of the whole process; the unit is in the name
-  std::vector<StageTimes> stages;                          // by decreasing total time
+  std::vector<std::pair<std::string, Spread>> process;  // figures of the whole process by name, which contains the unit
+  std::vector<StageTimes> stages;                       // by decreasing total time
   std::vector<std::pair<std::string, std::int64_t>> work;  // counts that are equal in all runs
   std::vector<VaryingCount> varying;
   friend bool operator==(const TimeReport&, const TimeReport&) = default;
 };
 
-// Of the summaries (session/summary.h) of one or more complete runs.
+// Builds the report from the summaries (session/summary.h) of one or more complete runs.
 TimeReport make_time_report(const TimeConditions& conditions, std::span<const nlohmann::ordered_json> summaries);
 
 // The content of time.json.
 std::string time_json(const TimeReport& report);
 
-// Errors name the key of what is missing or of another type; `file` is its name.
+// Parses time.json. Errors name the key of a value that is missing or has the wrong type; `file` is the name used in
+// errors.
 Result<TimeReport> parse_time_json(const std::string& text, const std::string& file);
 
 // Tables of the process, the stages and the work.
 std::vector<report::Table> time_tables(const TimeReport& report);
 
-// "peak memory MB" for "peak_memory_mb".
+// Text for a figure's name: "peak memory MB" for "peak_memory_mb".
 std::string spoken(std::string name);
 
 }  // namespace bslam::benchmark

@@ -8,21 +8,22 @@
 namespace bslam::calibration {
 namespace {
 
-constexpr std::size_t kMinKeypoints = 100;  // per image; images with fewer, of a dark or blank scene, tell nothing
-constexpr double kMuchOverlap = 0.4;        // of views of which some features are expected to be matched
-constexpr double kHardlyAny = 0.02;         // share of matched keypoints; 0.1 to 0.7 is usual
-constexpr double kEnough = 0.2;             // with this share a pair with much overlap needs no further test
-constexpr int kMinKeyframes = 2;            // for a statement about hardly any matches
-constexpr std::size_t kImagePairs = 24, kImagesPerPair = 8;  // maximum numbers that are matched again
+// Per image; images with fewer show a dark or blank scene and are not evaluated.
+constexpr std::size_t kMinKeypoints = 100;
+constexpr double kMuchOverlap = 0.4;  // overlap above which some features are expected to be matched
+constexpr double kHardlyAny = 0.02;   // share of matched keypoints; 0.1 to 0.7 is usual
+constexpr double kEnough = 0.2;       // with this share a pair with much overlap needs no further test
+constexpr int kMinKeyframes = 2;      // minimum number of keyframes to report that hardly anything was matched
+constexpr std::size_t kImagePairs = 24, kImagesPerPair = 8;  // maximum numbers of images that are matched again
 constexpr double kMinExplained = 0.4;                        // share of matches that the other arrangement explains
-constexpr double kClearly = 2;                               // times as many as the calibration explains
+constexpr double kClearly = 2;  // minimum ratio to the number of matches that the calibration explains
 
 const frame::CameraFrame& image_of(const map::BundledMap& map, KeyframeId k, std::size_t camera) {
   return map.keyframe(k).frame->cameras[camera];
 }
 
-// The keyframes in which both cameras have an image of the same time with enough keypoints. `shift_ns`: how much the
-// map has moved the times of camera i against those of camera j.
+// The keyframes in which both cameras have an image of the same time with enough keypoints. `shift_ns`: change of the
+// times of camera i relative to those of camera j by the calibration of the map.
 std::vector<KeyframeId> common_keyframes(const map::BundledMap& map, std::span<const KeyframeId> keyframes,
                                          std::size_t i, std::size_t j, TimeNs shift_ns = 0) {
   std::vector<KeyframeId> out;
@@ -88,7 +89,7 @@ CameraPair count_features(const map::BundledMap& map, std::span<const KeyframeId
 
 bool explained_by(const PairEvidence& evidence) { return evidence.agreeing[0] >= kMinExplained * evidence.matches; }
 
-// How much the times of a camera were moved by its refinement.
+// Change of the times of a camera by the refinement of the calibration.
 TimeNs shift_of(const camera::Rig& given, const camera::Rig& final_rig, std::size_t camera) {
   return final_rig.camera(camera).time_offset_ns - given.camera(camera).time_offset_ns;
 }
@@ -135,7 +136,7 @@ std::vector<CameraPair> test_pairs(const map::BundledMap& map, std::span<const K
   for (std::size_t p = 0; p < pairs.size(); ++p) {
     CameraPair& pair = pairs[p];
     const std::size_t i = pair.first, j = pair.second;
-    // An offset between the times of the cameras may have been estimated, which images taken together do not have.
+    // The refinement may have estimated an offset between cameras that capture at the same time.
     const bool for_mirrors_only = common[p].empty() || (sound[i] && sound[j]);
     if (suspected && common[p].empty())
       common[p] = common_keyframes(map, keyframes, first_camera + i, first_camera + j,

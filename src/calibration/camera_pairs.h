@@ -1,5 +1,6 @@
-// Tests after a run whether its images belong to the calibration: cameras whose views overlap must see the same things
-// where the calibration says so. The refinement of a rig cannot tell, since it uses only matches that agree.
+// Tests after a run whether its images belong to the calibration: cameras with overlapping views must observe the same
+// points, in directions that agree with the calibration. The refinement of the rig cannot test this, because it uses
+// only matches that are consistent with the calibration.
 #pragma once
 
 #include <optional>
@@ -15,7 +16,7 @@ namespace bslam::calibration {
 struct CameraPair {
   std::size_t first = 0, second = 0;  // cameras of the run
   double overlap = 0;                 // largest fraction of the view of one of them that the other observes as well
-  int keyframes = 0;                  // in which both have an image of the same time with enough keypoints
+  int keyframes = 0;  // number of keyframes in which both have an image of the same time with enough keypoints
   // Number of keypoints in these keyframes that are in the common part of the views, for the camera with fewer of them,
   // and how many of them were matched with a keypoint of the other camera.
   double common = 0;
@@ -24,23 +25,24 @@ struct CameraPair {
   std::optional<PairEvidence> evidence = {};
   bool contradicted = false;  // the evidence shows another arrangement of the cameras than the calibration
 
-  // Whether it is contradicted because the images of both cameras are mirrored.
+  // Returns true if the calibration is contradicted because the images of both cameras are mirrored.
   bool mirrored() const { return contradicted && evidence && evidence->verdict == Convention::kMirrored; }
 
   double matched_share() const { return common > 0 ? matched / common : 0; }
-  // Whether the views overlap and have features, but hardly any was matched.
+  // Returns true if the views overlap and have features, but hardly any feature was matched.
   bool hardly_matched() const;
 };
 
 // Whether the evidence shows that the images do not belong to the calibration, rather than a calibration that is
-// inaccurate or a camera that was knocked: nearly all matches are consistent with exchanged cameras, with inverted
+// inaccurate or a camera that was bumped: nearly all matches are consistent with exchanged cameras, with inverted
 // transforms, or with a pose of the second camera that has nothing to do with the calibrated one.
 bool shows_another_arrangement(const PairEvidence& evidence);
 
 // All pairs of the cameras of a run, by keyframes `keyframes` of its map. `given` and `final_rig`: the calibration of
 // the run before and after its refinement, whose camera 0 is camera `first_camera` of the map. A pair is contradicted
-// only if both are. `suspected`: the images contradict the calibration, so that pairs that were matched are tested for
-// mirrored images, too: a refinement makes wrong matches of these fit. Takes some 10 ms per pair that is tested.
+// only if both are. `suspected`: the images contradict the calibration, so that pairs with matches are tested for
+// mirrored images as well, because a refinement can make wrong matches of mirrored images fit. Takes some 10 ms per
+// pair that is tested.
 std::vector<CameraPair> test_pairs(const map::BundledMap& map, std::span<const KeyframeId> keyframes,
                                    std::size_t first_camera, const camera::Rig& given, const camera::Rig& final_rig,
                                    bool suspected = false);

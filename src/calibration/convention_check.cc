@@ -18,7 +18,7 @@ using geometry::SE3;
 
 constexpr int kMaxHamming = 60;       // bits; largest descriptor distance of a match
 constexpr double kRatio = 0.85;       // largest ratio of best to second best descriptor distance
-constexpr double kTolerancePx = 2.0;  // of calibration and feature localisation together
+constexpr double kTolerancePx = 2.0;  // tolerance for the errors of calibration and feature localisation together
 constexpr int kMinAgreeing = 25;
 constexpr double kMinRatio = 0.4;     // minimum fraction of consistent matches; random matches reach a few per cent
 constexpr double kClearly = 1.3;      // factor between numbers of consistent matches that counts as a clear difference
@@ -94,7 +94,7 @@ int count_agreeing(const Hypothesis& h, std::span<const PixelPair> pairs) {
   return apart ? found.all : found.all - found.with_depth;
 }
 
-// How much the pose of the second camera in the first one differs from the given one.
+// Difference between the estimated and the given pose of the second camera in the first.
 OtherPose difference(const SE3& found, const SE3& given) {
   OtherPose out{.rotated_deg = geometry::degrees(geometry::so3_log((found * given.inverse()).rotation()).norm())};
   const Eigen::Vector3d lies = found.inverse().translation(), should_lie = given.inverse().translation();
@@ -103,8 +103,9 @@ OtherPose difference(const SE3& found, const SE3& given) {
   return out;
 }
 
-// The calibrations of two cameras, not just those of the pair, that are consistent with most matches. Those of pairs
-// that are arranged much like this one are not tried: they may fit better only because a camera was knocked.
+// The calibrations of two cameras of the rig, possibly others than this pair, that are consistent with most matches.
+// Pairs with nearly the same arrangement as this one are not tried: they may only fit better because a camera was
+// bumped.
 std::optional<OtherCalibrations> other_calibrations(const camera::Rig& rig, std::size_t i, std::size_t j,
                                                     std::span<const PixelPair> pairs) {
   const SE3 given = rig.cam_from_rig(j) * rig.rig_from_cam(i);

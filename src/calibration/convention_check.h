@@ -36,7 +36,7 @@ struct OtherPose {
   double rotated_deg = 0;    // angle between the estimated and the given orientation of the second camera
   double displaced_deg = 0;  // angle between the estimated and the given direction of the baseline; 0 without baseline
 
-  // Whether no knock explains so large a difference.
+  // Returns true if the difference is too large for a camera that was bumped.
   bool is_another_arrangement() const;
 };
 

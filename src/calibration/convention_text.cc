@@ -1,4 +1,4 @@
-// The words of calibration/convention_check.h for users.
+// Texts for users about the results of calibration/convention_check.h.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -32,7 +32,7 @@ namespace {
 
 constexpr const char* kOrMirrored = ", or if the images of both cameras are mirrored left to right";
 
-// Whether mirrored images explain as much as the mistake that was found.
+// Returns true if mirrored images explain as many matches as the mistake that was found.
 bool may_be_mirrored(const PairEvidence& pair) {
   return pair.verdict && *pair.verdict != Convention::kMirrored && pair.fits_as_well_mirrored(*pair.verdict);
 }
@@ -87,7 +87,8 @@ std::string_view why_untested(const PairEvidence& pair) {
   return pair.overlap < kSomeOverlap ? "views that hardly overlap" : "too few matches";
 }
 
-// For rigs without a fault: the pairs that could not be tested, and why, and the cameras without a pair that was.
+// For rigs without a fault: the pairs that could not be tested with the reasons, and the cameras of which no pair could
+// be tested.
 std::string untested_text(std::span<const PairEvidence> evidence) {
   constexpr std::size_t kShown = 6;
   std::map<std::string_view, std::vector<std::string>> pairs;  // by reason
@@ -110,7 +111,7 @@ std::string untested_text(std::span<const PairEvidence> evidence) {
   return text;
 }
 
-// Pairs that should have been tested, since the calibrated views overlap.
+// Pairs that could not be tested although their calibrated views overlap.
 std::string warning_of_untested(std::span<const PairEvidence> evidence) {
   constexpr double kMuchOverlap = 0.4;  // opposite fisheyes with less hardly match at the edges of their views
   std::vector<std::string> untested;

@@ -17,7 +17,7 @@ struct ResidualCell {
 
 struct ImageResiduals {
   static constexpr std::size_t kColumns = 12, kRows = 8;
-  int width = 0, height = 0;  // of the image
+  int width = 0, height = 0;  // pixels, size of the image
   std::size_t observations = 0;
   double rms_px = 0;                // root mean square of the distance to the projection; 0 without observations
   std::vector<ResidualCell> cells;  // kRows rows of kColumns cells

@@ -1,4 +1,4 @@
-// The calibration that follows from several recordings of one rig.
+// Combines the calibrations that were estimated from several recordings of one rig.
 #pragma once
 
 #include <span>
@@ -8,12 +8,12 @@
 
 namespace bslam::calibration {
 
-// A parameter of the calibration, and how well it is known.
+// A parameter of the calibration and its uncertainty.
 struct CalibratedValue {
   double change =
-      0;           // from the given value; in px for intrinsics (distortion: no unit), radians or metres for extrinsics
-  double std = 0;  // standard deviation
-  bool observed = false;  // std is less than half of the given value's
+      0;  // estimate minus given value; in px for intrinsics (distortion: no unit), radians or metres for extrinsics
+  double std = 0;         // standard deviation
+  bool observed = false;  // std is less than half of the prior's
 };
 
 struct CalibratedCamera {
@@ -28,9 +28,9 @@ struct JointRefinement {
   RigInformation information;
 };
 
-// Mean of estimates that were made from different recordings with the same prior, each weighted by its information. The
-// prior counts once in the deviations. `refinements`: at least one; all `done`, of the same rig `calibrated` and with
-// intrinsics. Returns nullopt if the information is singular.
+// Mean of estimates from different recordings with the same prior, weighted by their information matrices. The
+// resulting covariance includes the prior once. `refinements`: at least one; all `done`, of the same rig `calibrated`
+// and with intrinsics. Returns nullopt if the information is singular.
 std::optional<JointRefinement> combine(const camera::Rig& calibrated, std::span<const RigRefinement> refinements);
 
 }  // namespace bslam::calibration

@@ -14,7 +14,7 @@
 namespace bslam::calibration {
 namespace {
 
-constexpr std::size_t kTriple = 3;  // frames that follow each other
+constexpr std::size_t kTriple = 3;  // number of consecutive frames
 
 // The triples from `begin` to `end`.
 struct Part {
@@ -22,8 +22,8 @@ struct Part {
   std::size_t begin, end;
 };
 
-// Whether the images of each frame were taken together: within a quarter of the interval between frames. Images of
-// cameras that fire one after the other may be nearer to those of the next frame.
+// Returns true if the images of each frame were taken within a quarter of the interval between frames. Images of
+// cameras that are triggered one after the other may be nearer to those of the next frame.
 bool are_together(std::span<const image::ImageBundle> triple) {
   const TimeNs interval_ns = (triple[2].time_ns - triple[0].time_ns) / 2;
   return std::ranges::all_of(triple, [&](const image::ImageBundle& frame) {
@@ -48,7 +48,7 @@ constexpr int kMinAgreeing = 60;  // matches
 
 double share(const PairEvidence& e) { return e.matches > 0 ? 1.0 * e.agreeing[0] / e.matches : 0.0; }
 
-// What the pair shows, of its second camera; nullopt if images of the same frame fit as well.
+// Returns the shift of the second camera of the pair; nullopt if images of the same frame fit as well.
 std::optional<LateCamera> judge(const camera::Rig& rig, std::size_t i, std::size_t j,
                                 const std::vector<std::vector<View>>& views, const Part& part) {
   constexpr double kClearly = 1.3, kMuchLarger = 0.15;
@@ -72,8 +72,9 @@ std::optional<LateCamera> judge(const camera::Rig& rig, std::size_t i, std::size
   return out;
 }
 
-// Whether images of the same frame fit outside of the part, as they do before a frame is lost and after it is found
-// again. A wrong rotation looks like an image that is late wherever the rig turns steadily, and fits nowhere.
+// Returns true if images of the same frame fit outside of the part, as expected if the camera lost a frame, or caught
+// up, at the border of the part. A wrong rotation also looks like a late image while the rig turns steadily, but then
+// images of the same frame fit nowhere.
 bool fits_elsewhere(const camera::Rig& rig, const LateCamera& late, const std::vector<std::vector<View>>& views,
                     const Part& part) {
   const std::size_t count = views[late.camera].size() / kTriple;

@@ -9,7 +9,8 @@
 namespace bslam::calibration {
 namespace {
 
-constexpr double kMaxDeviation = 0.05;  // a map whose scale is less certain follows the estimate
+// maximum change of scale that is withheld because it is within the standard deviation
+constexpr double kMaxDeviation = 0.05;
 
 // Calls visit(i, step) with the displacement from keyframe i - 1 to keyframe i of the same group.
 template <class Visit>

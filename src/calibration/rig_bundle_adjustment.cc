@@ -11,7 +11,7 @@ namespace bslam::calibration {
 namespace {
 
 constexpr int kDensePoses = 150;
-constexpr double kObservedRatio = 0.5;  // maximum standard deviation of an observed one, relative to the prior's
+constexpr double kObservedRatio = 0.5;  // maximum standard deviation of an observed value, relative to the prior's
 
 // Convergence of all rounds but the last: they only determine which observations the next one uses.
 constexpr double kEarlyDecrease = 1e-4;
@@ -246,7 +246,8 @@ double restore_scale(const solver::RigValues& calibrated, std::span<const std::u
   return factor;
 }
 
-// Whether the previous round, with the same kernel, has already used the observations that a round would use.
+// Returns true if the previous round had the same kernel and used the same observations, so that this round can be
+// skipped.
 bool repeats(const Round& round, const std::vector<std::uint8_t>& skip,
              const std::vector<std::uint8_t>& skipped_before) {
   return &round != &kRounds.front() && &round != &kRounds.back() && round.kernel == (&round - 1)->kernel &&

@@ -17,18 +17,18 @@ struct RigAdjustmentOptions {
   double sigma_rotation = 0.035;    // radians, per axis: standard deviation of the calibrated extrinsics (2 degrees)
   double sigma_translation = 0.03;  // metres, per axis
   double sigma_depth = 0;           // metres, additionally along the optical axes (ExtrinsicPrior)
-  // Of the common scale of all baselines, relative. If it is positive, all lengths are scaled so that the baselines
-  // keep this scale exactly: images do not reveal it, and iterations along a direction without information do not
-  // converge.
+  // Relative standard deviation of the common scale of all baselines. If it is positive, all lengths are rescaled after
+  // each round so that the common scale of the baselines stays as calibrated: the images do not determine it, and
+  // iterations along a direction without information do not converge.
   double sigma_scale = 0;
   // Per camera: standard deviations of the calibrated intrinsics (camera/model_parameters.h). Empty: the intrinsics are
   // constant.
   std::vector<camera::ModelParameters> sigma_intrinsics = {};
-  double sigma_aspect = 0;  // of fx / fy, relative; 0: from the above
+  double sigma_aspect = 0;  // relative standard deviation of fx / fy; 0: follows from sigma_intrinsics
   // Per camera; needs solver::ReprojectionProblem::twist. Empty: the timing is constant.
   std::vector<solver::TimingPrior> timing = {};
-  // Number of observations with the information of one independent observation. Errors of a landmark in successive
-  // images are similar, so that the normal equations overestimate the information of the images.
+  // Number of observations that carry as much information as one independent observation. Errors of a landmark in
+  // successive images are similar, so that the normal equations overestimate the information of the images.
   double correlated_observations = 1;
   bool pose_effects = true;         // compute RigAdjustment::pose_effects
   bool start_is_estimate = false;   // the start is near the result: the rounds with Huber kernel are omitted
@@ -46,12 +46,12 @@ struct CameraEstimate {
   // this degree of freedom appear in `change`. A common scale of all baselines is not observed unless the scale is
   // determined otherwise.
   std::array<bool, 6> observed = {};
-  // The same for the intrinsics; empty if they are constant.
+  // Change, standard deviation and observability of the intrinsics; empty if they are constant.
   camera::ModelParameters intrinsics_change, intrinsics_sigma;
   std::vector<bool> intrinsics_observed;
   // Differences to the prior's timing, and standard deviations, in seconds; 0 if constant.
   camera::CameraTiming timing_change, timing_sigma;
-  int observations = 0;  // number of observations that agree with the estimate
+  int observations = 0;  // number of inliers
 };
 
 // The estimate as a normal distribution of the change from the calibration, and the prior, whose mean is zero. The
@@ -70,10 +70,10 @@ struct RigAdjustment {
   // Per pose of the problem: its perturbation by the error of the estimate; zero if the pose is fixed. Empty if the
   // options exclude it.
   std::vector<geometry::PoseUncertainty::Effect> pose_effects;
-  double final_cost = 0;       // as in LmSummary, of the observations that agree and the prior
+  double final_cost = 0;       // cost as in LmSummary, of the inliers and the prior
   double variance_factor = 1;  // mean squared normalised error over its expectation; if > 1 it scales the covariances
-  double scale_change = 1;     // factor by which all lengths of the problem were multiplied, as described above
-  // How much the mean squared error of the observations would grow, as a fraction, if the calibration were constant.
+  double scale_change = 1;     // factor by which all lengths of the problem were multiplied (see sigma_scale)
+  // Relative increase of the mean squared error of the observations if the calibration were constant.
   double excess_error = 0;
 };
 

@@ -6,13 +6,13 @@
 namespace bslam::calibration {
 namespace {
 
-// Number of consecutive keyframes of a segment. Those of a short one share landmarks. A long one has turns and loops,
-// which tell the focal length: a part of a straight path hardly does.
+// Number of consecutive keyframes in a segment. The keyframes of a short segment share landmarks. A long segment
+// contains turns and loops, which determine the focal length; a straight path hardly does.
 constexpr std::size_t kShortSegment = 10, kLongSegment = 100;
 constexpr int kMinShared = 15;  // minimum number of shared landmarks for one keyframe to constrain another
 
-// Whether the velocity of a keyframe is known. The images of others show a rig whose late cameras and rolling shutters
-// are in the wrong place.
+// Returns true if the velocity of a keyframe is known. Otherwise cameras with other capture times and rolling shutters
+// are modelled at wrong positions.
 bool motion_known(const map::BundledMap& map, KeyframeId k) { return !map.keyframe(k).twist.isZero(0); }
 
 // The keyframes that can be used, in order of id. `timing`: the timing of the cameras is estimated.

@@ -15,7 +15,7 @@
 
 namespace bslam::calibration {
 
-// Whether the images contradict the calibration. kUnknown: too few observations to tell.
+// Whether the images contradict the calibration. kUnknown: too few observations to decide.
 enum class Verdict { kUnknown, kConsistent, kInconsistent };
 std::string_view verdict_name(Verdict verdict);  // "unknown", "consistent", "inconsistent"
 
@@ -28,23 +28,25 @@ enum class Refine {
 struct CalibrationOptions {
   Refine refine = Refine::kAuto;
   bool check = true;      // at the end of a run, estimate the calibration and report differences
-  int keyframes = 2000;   // maximum number, in segments of consecutive keyframes distributed over the map
+  int keyframes = 2000;   // maximum number, in segments of consecutive keyframes that are distributed over the map
   int landmarks = 20000;  // maximum number, distributed over segments and cameras
   // Standard deviations of the given calibration: the prior of the estimate. Extrinsics: per axis. Focal lengths
   // and their ratio: relative. Principal points: per axis, of the image width. Distortion: of the model table
   // (camera/model_table.h).
   double sigma_rotation_deg = 2.0;
   double sigma_translation_mm = 2.0, sigma_translation_percent = 1.0;  // added in quadrature
-  double sigma_depth_mm = 5.0;       // of translations, additionally along the optical axes (solver::ExtrinsicPrior)
-  double sigma_scale_percent = 0.5;  // of the common scale of all baselines, which images do not reveal
+  // Additional standard deviation of translations along the optical axes (solver::ExtrinsicPrior)
+  double sigma_depth_mm = 5.0;
+  double sigma_scale_percent = 0.5;  // of the common scale of all baselines, which the images do not determine
   // During a run, the map keeps its scale while it differs from that of the calibrated baselines by less than this, or
   // by less than the standard deviation of the estimate.
   double scale_tolerance_percent = 1.5;
   double sigma_focal_percent = 1.0, sigma_aspect_percent = 0.1, sigma_centre_percent = 0.5;
-  // Of time offsets and of the readout times of rolling shutters. They are constant unless the images contradict them
-  // by more than `suspect_ms`.
+  // Standard deviations of the given time offsets and readout times of rolling shutters. These are kept constant unless
+  // the images contradict them by more than `suspect_ms`.
   double sigma_time_offset_ms = 5.0, sigma_readout_ms = 10.0;
-  // Number of observations with the information of one: errors of a landmark in successive images are similar.
+  // Number of observations that carry as much information as one, because the errors of a landmark in successive images
+  // are similar.
   double correlated_observations = 10;
   // The images contradict the calibration if it increases their mean squared error by more than this fraction.
   double inconsistent_excess = 0.1;
@@ -53,12 +55,13 @@ struct CalibrationOptions {
   // wrong timestamps: a camera with a time offset of 1 ms appears displaced by 10 mm at 10 m/s and rotated by 0.1
   // degrees at 100 degrees/s.
   double suspect_sigmas = 5.0, suspect_deg = 0.3, suspect_mm = 10.0;
-  double suspect_ms = 0.5;  // the same for time offsets and readout times
+  double suspect_ms = 0.5;  // absolute threshold for time offsets and readout times
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
     visitor("refine", self.refine, Range{}, "",
-            "replace the calibration by an estimate from the images: never, if they contradict it, or always",
+            "replace the calibration by an estimate from the images: false: never; auto: if they contradict it; true: "
+            "always",
             OptionNote{.common = true, .formerly = "extrinsics.refine"});
     visitor("check", self.check, Range{}, "",
             "at the end of a run, estimate the calibration and report cameras that differ from it",
@@ -68,20 +71,24 @@ struct CalibrationOptions {
     visitor("landmarks", self.landmarks, Range{100, 1e6}, "", "maximum number of landmarks used",
             OptionNote{.formerly = "extrinsics.landmarks"});
     visit_deviations(self, visitor);
-    visitor("scale_tolerance_percent", self.scale_tolerance_percent, Range{0, 100}, "%",
-            "minimum change of the scale that is made during a run; its standard deviation if that is larger");
+    visitor(
+        "scale_tolerance_percent", self.scale_tolerance_percent, Range{0, 100}, "%",
+        "during a run, smaller changes of the map's scale are not applied, nor changes within its standard deviation");
     visitor("correlated_observations", self.correlated_observations, Range{1, 1e4}, "",
-            "number of observations with the information of one");
+            "number of observations that carry as much information as one");
     visitor("inconsistent_excess", self.inconsistent_excess, Range{0, 100}, "",
-            "increase of the mean squared error by a calibration that the images contradict, as a fraction");
+            "the images contradict a calibration that increases the mean squared error by more than this fraction");
     visitor("suspect_sigmas", self.suspect_sigmas, Range{1, 100}, "",
             "a suspect camera changed by more than this number of standard deviations",
             OptionNote{.formerly = "extrinsics.suspect_sigmas"});
-    visitor("suspect_deg", self.suspect_deg, Range{0, 180}, "deg", "and rotated by more than this",
+    visitor("suspect_deg", self.suspect_deg, Range{0, 180}, "deg",
+            "minimum rotation of a suspect camera, in addition to suspect_sigmas",
             OptionNote{.formerly = "extrinsics.suspect_deg"});
-    visitor("suspect_mm", self.suspect_mm, Range{0, 1e5}, "mm", "or moved by more than this",
+    visitor("suspect_mm", self.suspect_mm, Range{0, 1e5}, "mm",
+            "minimum displacement of a suspect camera, in addition to suspect_sigmas",
             OptionNote{.formerly = "extrinsics.suspect_mm"});
-    visitor("suspect_ms", self.suspect_ms, Range{0, 1e3}, "ms", "minimum change of a time that is estimated");
+    visitor("suspect_ms", self.suspect_ms, Range{0, 1e3}, "ms",
+            "time offsets and readout times are only refined if the images contradict them by more than this");
   }
 
  private:
@@ -94,11 +101,11 @@ struct CalibrationOptions {
             "standard deviation of calibrated translations, per axis",
             OptionNote{.formerly = "extrinsics.calibration_mm"});
     visitor("sigma_translation_percent", self.sigma_translation_percent, Range{0, 100}, "%",
-            "and, added in quadrature, in percent of the longest distance of a camera from camera 0");
+            "added in quadrature: a part in percent of the longest distance of a camera from camera 0");
     visitor("sigma_depth_mm", self.sigma_depth_mm, Range{0, 1e4}, "mm",
-            "and, added in quadrature, along the optical axes of the camera and of camera 0");
+            "added in quadrature: a part along the optical axes of the camera and of camera 0");
     visitor("sigma_scale_percent", self.sigma_scale_percent, Range{1e-6, 100}, "%",
-            "deviation of the baselines' common scale");
+            "standard deviation of the common scale of all baselines");
     visitor("sigma_focal_percent", self.sigma_focal_percent, Range{1e-3, 50}, "%",
             "standard deviation of calibrated focal lengths");
     visitor("sigma_aspect_percent", self.sigma_aspect_percent, Range{1e-3, 50}, "%",
@@ -149,16 +156,17 @@ struct CameraRefinement {
 struct RigRefinement {
   bool done = false;  // false: one camera only, no metric scale, too few observations, stopped or failed
   std::vector<CameraRefinement> cameras;     // all cameras in the order of the rig, if done
-  std::size_t keyframes = 0, landmarks = 0;  // numbers used
-  double excess_error = 0;  // increase of the mean squared error by the given calibration, as a fraction
+  std::size_t keyframes = 0, landmarks = 0;  // numbers of keyframes and landmarks used
+  double excess_error = 0;                   // relative increase of the mean squared error with the given calibration
   Verdict verdict = Verdict::kUnknown;
   // If done: the estimated rig, and the poses and landmarks that belong to it, of the keyframes and landmarks used.
   std::optional<camera::Rig> rig;
-  RigInformation information;  // of the estimate, to combine it with those of other maps
+  RigInformation information;  // information of the estimate, to combine it with estimates from other maps
   double scale_change = 1;     // factor by which the lengths of the map change
-  double scale_deviation = 0;  // of scale_change, by the error of the calibration; 0 if it is not known
-  double kept_scale = 1;       // factor by which keep_scale() multiplied the baselines
-  map::SetPoses poses;         // after this change
+  // Standard deviation of scale_change due to the error of the calibration; 0 if it is not known.
+  double scale_deviation = 0;
+  double kept_scale = 1;  // factor by which keep_scale() multiplied the baselines
+  map::SetPoses poses;    // poses of keyframes after the change of scale
 };
 
 // Selects keyframes and landmarks and adjusts them with free calibration, beginning with the rig of the map; the map is
@@ -174,14 +182,15 @@ Eigen::MatrixXd prior_information(const camera::Rig& calibrated, const Calibrati
 bool accepted(const RigRefinement& refinement, const CalibrationOptions& options);
 // Whether an earlier estimate has replaced the calibration of a map. An accepted estimate always changes extrinsics.
 bool replaced(const camera::Rig& of_map, const camera::Rig& calibrated);
-// As refine_rig, if the estimate is to be accepted. If this depends on the verdict, it is determined first from a
-// fraction of the keyframes and landmarks.
+// Returns the result of refine_rig if the estimate is to be accepted. If that depends on the verdict, the verdict is
+// determined first from a fraction of the keyframes and landmarks.
 std::optional<RigRefinement> refine_if_accepted(const map::BundledMap& map, const camera::Rig& calibrated,
                                                 const CalibrationOptions& options,
                                                 const feature::FeatureModel& features,
                                                 const std::stop_token& stop = {});
-// Moves the submap of a keyframe as a whole so that the keyframe has the given pose. The world frame is where the root
-// was at first: the distance of the root from the origin is an error of all keyframes, and added to their uncertainty.
+// Moves the submap of a keyframe as a whole so that the keyframe has the given pose. The origin of the world frame is
+// the original pose of the root. The displacement of the root is therefore an error of all keyframes, and is added to
+// their uncertainty.
 void move_submap(KeyframeId keyframe, const geometry::SE3& T_rig_world, map::MapDraft& draft);
 // Replaces the rig of the draft's map by the estimate, with the poses and landmarks that belong to it; all others have
 // to be adjusted afterwards. The refinement must be done, and its map the draft's.

@@ -19,7 +19,7 @@ constexpr double kMinBaseline = 1e-3, kMaxBaseline = 5.0;  // metres
 
 Vector3d axis_of(const camera::Rig& rig, std::size_t i) { return rig.rig_from_cam(i).rotation() * Vector3d::UnitZ(); }
 
-// A question about the unit that would explain the length of the baselines.
+// Text that asks for the unit that would explain the length of the baselines.
 std::string unit_question(const camera::Rig& rig) {
   double longest = 0.0;
   for (std::size_t i = 1; i < rig.size(); ++i) longest = std::max(longest, rig.rig_from_cam(i).translation().norm());

@@ -5,9 +5,9 @@
 
 namespace bslam::calibration {
 
-// Triangulates these landmarks again with the calibration of the draft's map. Bundle adjustment, in which they have no
-// part, keeps their positions relative to their keyframe, which are those of the calibration they were created with.
-// Landmarks whose rays do not intersect in front of the cameras keep their position.
+// Triangulates these landmarks again with the calibration of the draft's map. Bundle adjustment does not include them.
+// Until then they keep the position relative to their keyframe that follows from the calibration with which they were
+// created. Landmarks whose rays do not intersect in front of the cameras keep their position.
 void triangulate_single_views(map::MapDraft& draft);
 
 }  // namespace bslam::calibration

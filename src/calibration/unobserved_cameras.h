@@ -6,11 +6,11 @@
 
 namespace bslam::calibration {
 
-// Lets cameras with hardly any observation follow the intrinsics of camera 0 in the estimate: extrinsics are calibrated
-// relative to the axes that camera 0 has with its intrinsics. With intrinsics that turn these axes by
-// R_given_estimated, for the centre of the image, an unobserved camera has
+// Corrects the extrinsics of cameras with hardly any observations for the estimated intrinsics of camera 0. Calibrated
+// extrinsics are relative to the axes of camera 0 under the given intrinsics. If the estimated intrinsics rotate the
+// ray of the image centre by R_given_estimated, an unobserved camera has
 //     T_cam_rig = T_cam_rig,given R_given_estimated.
-// With the given extrinsics it would contradict the other cameras from then on.
+// With the given extrinsics it would be inconsistent with the other cameras.
 void complete_unobserved_cameras(const camera::Rig& given, RigAdjustment& adjusted);
 
 }  // namespace bslam::calibration

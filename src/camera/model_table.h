@@ -22,7 +22,7 @@ struct ModelParameter {
 };
 
 struct ModelRow {
-  std::string_view name;                   // as written in rig files
+  std::string_view name;                   // name of the model in rig files
   std::vector<ModelParameter> parameters;  // in the order of rig files
   std::vector<std::size_t> counts;         // the accepted numbers of parameters in a file, ascending
   CameraModel (*make)(const Intrinsics& intrinsics,

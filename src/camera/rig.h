@@ -1,5 +1,5 @@
 // The rig: N cameras and their constant extrinsics. The rig frame is the frame of camera 0 (the paper's camera 1) as it
-// was calibrated, so T_cam_rig of camera 0 is the identity, but for the rotation of a refined calibration (see the
+// was calibrated, so T_cam_rig of camera 0 is the identity, except for the rotation of a refined calibration (see the
 // constructor). The paper's T_i1 is T_cam_rig of camera i, and c_i = T_i1 c_1 is cam_from_rig(i) * T_rig_world.
 #pragma once
 

@@ -9,7 +9,7 @@ namespace bslam::camera {
 
 // When the rows of a camera are exposed, relative to the capture time of its image.
 struct CameraTiming {
-  double shift_s = 0;    // of the middle row: the error of the capture time
+  double shift_s = 0;    // exposure of the middle row minus the capture time: the error of the capture time
   double readout_s = 0;  // see Camera::readout_s
 };
 
@@ -27,7 +27,7 @@ struct Shutter {
   Shutter(const Camera& camera, const CameraTiming& timing, const geometry::SE3& T_cam_rig,
           const geometry::Vector6d& twist);
 
-  // Whether rows are exposed at other times than the capture time.
+  // Returns true if rows are exposed at times that differ from the capture time.
   bool rolling() const { return seconds_per_px != 0 || shift_s != 0; }
   // The exposure of the row at this height relative to the capture time, in seconds.
   double delay_s(double pixel_y) const { return shift_s + seconds_per_px * (pixel_y - middle_row_px); }

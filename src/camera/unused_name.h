@@ -1,4 +1,4 @@
-// Names of cameras that are added to others.
+// Unique names for cameras that are added to a list of cameras.
 #pragma once
 
 #include <span>
@@ -8,8 +8,8 @@
 
 namespace bslam::camera {
 
-// Returns the name of a camera that is added after these ones: its own, or "cam" with its number if one of them has
-// that name already.
+// Returns the name for a camera that is appended to these: its own name, or "cam" and its index if its own name is
+// already used.
 std::string unused_name(std::span<const RigCamera> taken, const std::string& name);
 
 }  // namespace bslam::camera

@@ -16,24 +16,25 @@ namespace bslam::capture {
 // How the pixels of an image lie in memory: one of kPixelFormats.
 using FourCc = std::uint32_t;
 
-// What is asked of a camera.
+// The requested settings of a camera.
 struct StreamRequest {
   int width = 0, height = 0;          // pixels
   std::optional<double> fps = {};     // default: the highest up to 60 that the format offers
   std::optional<FourCc> pixels = {};  // default: the one that needs least conversion at this rate
   enum class Exposure { kAsItIs, kAutomatic, kFixed } exposure = Exposure::kAsItIs;
-  int exposure_us = 0;         // if it is fixed
+  int exposure_us = 0;         // microseconds, if the exposure is fixed
   TimeNs clock_offset_ns = 0;  // added to times of CLOCK_MONOTONIC
 };
 
-// What a camera was set to.
+// The settings that a camera has accepted.
 struct Stream {
   FourCc pixels = 0;
   int width = 0, height = 0;
   std::size_t step = 0;                 // bytes from one row to the next; 0 for whole files
   std::optional<double> fps = {};       // nullopt: unknown
-  std::vector<std::string> notes = {};  // for the user: what differs from the request
-  std::string identity = {};            // "NAME at PORT", by which a camera is known again; empty: by its path only
+  std::vector<std::string> notes = {};  // messages for the user about differences from the request
+  // "NAME at PORT", to recognise the camera after a reconnect; empty: only its path identifies it.
+  std::string identity = {};
 };
 
 struct DeviceImage {

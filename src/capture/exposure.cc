@@ -12,7 +12,7 @@
 namespace bslam::capture {
 namespace {
 
-constexpr int kUnitUs = 100;  // of V4L2_CID_EXPOSURE_ABSOLUTE
+constexpr int kUnitUs = 100;  // unit of V4L2_CID_EXPOSURE_ABSOLUTE in microseconds
 
 bool set_control(VideoCalls& calls, int device, std::uint32_t id, int value) {
   v4l2_control control{id, value};

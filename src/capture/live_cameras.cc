@@ -19,7 +19,7 @@ constexpr auto kReadTimeout = std::chrono::milliseconds(100);  // after which a 
 SyncOptions sync_options(double tolerance_s, std::function<void(const DroppedImage&)> on_drop) {
   SyncOptions options;
   options.tolerance_s = tolerance_s;
-  options.max_bundles = 1'000'000;  // they are fetched at once
+  options.max_bundles = 1'000'000;  // bundles are fetched immediately, so that the limit is never reached
   options.on_drop = std::move(on_drop);
   return options;
 }
@@ -64,7 +64,7 @@ Result<std::unique_ptr<LiveCameras>> LiveCameras::open(const camera::Rig& rig, L
     if (!stream) return stream.error();
     camera.device = *std::move(device);
     camera.stream = *std::move(stream);
-    camera.request.pixels = camera.stream.pixels;  // when it is opened again
+    camera.request.pixels = camera.stream.pixels;  // used when the camera is opened again
     for (const std::string& note : camera.stream.notes) live->say(c, note);
   }
   live->running_ = rig.size();
@@ -116,7 +116,8 @@ void LiveCameras::run(std::size_t c, const std::stop_token& stop) {
     if (failure) failure_ = failure;
   }
   if (last) {
-    [[maybe_unused]] const Status closed = synchronizer_->close();  // only errors of on_drop, which has none
+    // Close() only returns errors of on_drop, which never fails.
+    [[maybe_unused]] const Status closed = synchronizer_->close();
     collect();
   }
   const std::lock_guard lock(mutex_);
@@ -271,7 +272,7 @@ Result<TimeNs> LiveCameras::wait_for_first_frame() {
   return no_images();
 }
 
-// Why there is no frame: a camera was lost, or has delivered nothing. Needs mutex_.
+// Returns the reason why there is no frame: a camera was lost or has delivered nothing. mutex_ must be held.
 Error LiveCameras::no_images() const {
   auto culprit = std::ranges::find(cameras_, true, &CameraState::lost);
   if (culprit == cameras_.end()) culprit = std::ranges::find(cameras_, std::size_t{0}, &CameraState::images);

@@ -45,7 +45,7 @@ class LiveCameras final : public session::FrameSource {
   static Result<std::unique_ptr<LiveCameras>> open(const camera::Rig& rig, LiveOptions options);
   ~LiveCameras() override;
 
-  // What each camera was set to.
+  // The settings that each camera has accepted.
   std::vector<Stream> streams() const;
 
   // Waits until every camera has delivered an image, and returns the time of the first frame. Errors: a camera was lost
@@ -68,7 +68,8 @@ class LiveCameras final : public session::FrameSource {
   // Ends the capture; may be called from any thread.
   void stop();
 
-  // For the user, at the end: per camera, images that were damaged or could not be used, and how often it was lost.
+  // Messages for the user at the end of the run: per camera, the number of damaged or unusable images, and how often
+  // the camera was lost.
   std::vector<std::string> notes() const;
 
  private:
@@ -112,11 +113,11 @@ class LiveCameras final : public session::FrameSource {
   std::vector<CameraState> cameras_;
 
   std::mutex say_mutex_;
-  mutable std::mutex mutex_;  // guards all until `threads_`, and what CameraState says
+  mutable std::mutex mutex_;  // guards all members until `threads_`, and the members of CameraState that say so
   std::condition_variable_any changed_;
   std::deque<Waiting> waiting_;
-  std::size_t frames_waiting_ = 0;  // of them, those that were not dropped
-  bool overloaded_ = false;         // as many frames as may wait have been waiting, and some still are
+  std::size_t frames_waiting_ = 0;  // waiting frames that were not dropped
+  bool overloaded_ = false;         // the queue of frames has been full and is not empty yet
   bool begun_ = false, ended_ = false, stopped_ = false;
   std::size_t running_ = 0;  // threads
   std::exception_ptr failure_;

@@ -14,7 +14,7 @@ struct Format {
   FourCc pixels;
   PixelLayout layout;
   int bytes_per_pixel = 1;  // 0: whole files
-  int bits = 8;             // of values of two bytes: those in use
+  int bits = 8;             // number of bits in use, for values of two bytes
 };
 
 // NV12 begins with the brightness of all pixels.

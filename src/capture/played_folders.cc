@@ -26,8 +26,8 @@ std::vector<image_files::NumberedImage> images_of(const fs::path& folder) {
   return image_files::images_in(fs::is_directory(folder / "data", error) ? folder / "data" : folder);
 }
 
-// The time at which all folders began to be played, and how far each was played. A folder whose images pause for long
-// is opened again, as a camera would be, and goes on where it was.
+// The time at which playback began, and the position in each folder. A folder with a long pause between images is
+// opened again, as a camera would be, and continues at its position.
 class Playback {
  public:
   explicit Playback(TimeNs first_ns) : first_ns_(first_ns) {}
@@ -96,7 +96,7 @@ class PlayedFolder final : public Device {
   const std::string path_;
   const std::vector<image_files::NumberedImage> images_;
   const std::shared_ptr<Playback> playback_;
-  std::size_t& next_;  // of playback_
+  std::size_t& next_;  // index of the next image, in playback_
   int width_ = 0, height_ = 0;
   bool jpeg_ = false;
   std::string bytes_;

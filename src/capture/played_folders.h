@@ -1,4 +1,4 @@
-// Folders of images in place of cameras: to try live runs without cameras.
+// Plays folders of images as if they were cameras, to try live runs without cameras.
 #pragma once
 
 #include <string>
@@ -8,10 +8,10 @@
 
 namespace bslam::capture {
 
-// Returns what opens each of these folders, cameras of one recording whose images are named by their time stamps in ns,
-// such as mav0/cam0 of an EuRoC data set. Their images come when they are due: as long after the first read of any of
-// them as they were taken after the first image of all. Each keeps its time stamp. A folder that is opened again goes
-// on where it was.
+// Returns a function that opens these folders as devices. They are the cameras of one recording, with images named by
+// their time stamps in ns, such as mav0/cam0 of an EuRoC data set. Images are delivered at the recorded pace, counted
+// from the first read of any folder, with their recorded time stamps. A folder that is opened again continues with its
+// next image.
 OpenDevice play_folders(const std::vector<std::string>& folders);
 
 }  // namespace bslam::capture

@@ -18,7 +18,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::size_t kMaxWaiting = 32;                       // frames
-constexpr auto kFlushAfter = std::chrono::milliseconds(500);  // what is lost if the program is killed
+constexpr auto kFlushAfter = std::chrono::milliseconds(500);  // maximum duration that is lost if the program is killed
 
 bool is_name_character(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';

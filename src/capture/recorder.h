@@ -25,11 +25,11 @@ Result<camera::Rig> rig_as_recorded(const camera::Rig& rig);
 
 class Recorder {
  public:
-  // `numbers`: of the cameras of `rig` in the rig file. `jpeg[i]`: camera i delivers JPEG files, which are recorded as
-  // they are; other images are recorded as grey values. Error: the file cannot be written.
+  // `numbers`: indices in the rig file of the cameras of `rig`. `jpeg[i]`: camera i delivers JPEG files, which are
+  // recorded as they are; other images are recorded as grey values. Error: the file cannot be written.
   static Result<std::unique_ptr<Recorder>> create(const std::filesystem::path& path, const camera::Rig& rig,
                                                   const std::vector<int>& numbers, const std::vector<bool>& jpeg);
-  ~Recorder();  // as finish()
+  ~Recorder();  // calls finish()
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
 
@@ -40,7 +40,7 @@ class Recorder {
   // Writes what is left and ends the file. Error: it could not be written completely.
   Status finish();
 
-  // How much was written, complete after finish().
+  // Amount of data written; final after finish().
   std::size_t frames() const;
   std::uint64_t bytes() const;
 

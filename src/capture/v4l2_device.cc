@@ -27,7 +27,7 @@ TimeNs monotonic_now() {
   return static_cast<TimeNs>(now.tv_sec) * 1'000'000'000 + now.tv_nsec;
 }
 
-// A text of the driver, which fills its array or ends with 0.
+// Converts a text of the driver, which fills its array or ends with 0.
 template <std::size_t N>
 std::string text_of(const unsigned char (&text)[N]) {
   const char* const begin = reinterpret_cast<const char*>(text);
@@ -74,7 +74,7 @@ V4l2Device::~V4l2Device() {
   calls_.close(device_);
 }
 
-// The error of the last call.
+// Returns the error of the last system call.
 Error V4l2Device::failed(const char* what) const {
   if (errno == EBUSY)
     return {path_, "", "a camera that another program uses", "a camera that is free",
@@ -128,7 +128,7 @@ Status V4l2Device::set_format(const StreamRequest& request, const VideoMode& mod
   return {};
 }
 
-// The rate is a wish: cameras lower it in the dark, for example.
+// The camera may use another rate, for example a lower one in the dark.
 void V4l2Device::set_rate(const StreamRequest& request, const VideoMode& mode, Stream& stream) {
   v4l2_streamparm parameters{};
   const auto get = [&] {
@@ -141,7 +141,8 @@ void V4l2Device::set_rate(const StreamRequest& request, const VideoMode& mode, S
   const double wanted = request.fps.value_or(best_rate(mode, request));
   if (known && wanted > 0) {
     interval = {1000, static_cast<std::uint32_t>(std::lround(1000 * wanted))};
-    if (control(VIDIOC_S_PARM, &parameters) < 0) known = get();  // it holds what was asked for, not what was set
+    // On failure the structure holds the request, not the accepted values.
+    if (control(VIDIOC_S_PARM, &parameters) < 0) known = get();
   }
   if (known && interval.numerator > 0 && interval.denominator > 0)
     stream.fps = static_cast<double>(interval.denominator) / interval.numerator;

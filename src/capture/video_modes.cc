@@ -14,7 +14,7 @@
 namespace bslam::capture {
 namespace {
 
-constexpr std::uint32_t kMostEntries = 1000;  // of a list, in case a driver never ends it
+constexpr std::uint32_t kMostEntries = 1000;  // bound for the entries of a list, in case a driver never ends it
 constexpr double kUsualFps = 60;              // a higher rate has to be asked for
 
 double rate_of(const v4l2_fract& interval) {

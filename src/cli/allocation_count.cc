@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <new>
 
-#ifndef BSLAM_ONE_VERSION  // which builds with sanitizers define
+#ifndef BSLAM_ONE_VERSION  // defined by builds with sanitizers
 
 namespace {
 
@@ -16,7 +16,7 @@ void note_allocation() {
   if (g_counting.load(std::memory_order_relaxed)) g_allocations.fetch_add(1, std::memory_order_relaxed);
 }
 
-// As the standard requires of `operator new`: calls the handler until there is memory or it throws.
+// Allocates as the standard requires of `operator new`: calls the new-handler until there is memory or it throws.
 template <class Allocate>
 void* allocated(const Allocate& allocate) {
   note_allocation();

@@ -44,7 +44,7 @@ Result<geometry::SE3> body_from_camera(const BenchArguments& a, const Sequence& 
   return dataset->rig.body_from_cam(0);
 }
 
-// What one run produced, and the status with which the benchmark should end because of it.
+// The result of one run, and the exit status of the benchmark that follows from it.
 struct RunOutcome {
   RunMeasurement measurement;
   int status = kExitOk;
@@ -56,7 +56,7 @@ Result<RunMeasurement> measured(const BenchArguments& a, const Sequence& sequenc
   return benchmark::measure_run(folder, sequence, *pose);
 }
 
-// Runs a sequence in a process of its own: its peak memory is then its own, and a crash ends only this run.
+// Runs a sequence in a separate process, so that its peak memory is measured separately and a crash ends only this run.
 RunOutcome run_sequence(const BenchArguments& a, const Sequence& sequence, int run, const std::stop_token& stop) {
   const fs::path folder = fs::path(a.out) / sequence.name / fmt::format("run{}", run);
   const auto failed = [run](std::string message, int status) {
@@ -103,8 +103,8 @@ benchmark::BenchmarkConditions conditions_of(const BenchArguments& a, bool loops
           .complete = false};
 }
 
-// Whether two runs in a mode without threads of their own pace gave the same poses. Their seeds had no effect then:
-// random numbers are drawn to start without overlapping cameras, and where tracking is difficult or lost.
+// Returns true if two runs in a deterministic mode gave the same poses. Then their seeds had no effect: random numbers
+// are only drawn for monocular initialisation, and if tracking is difficult or lost.
 bool are_copies(const BenchArguments& a, const Sequence& sequence, execution::Mode mode) {
   if (mode == execution::Mode::kParallel) return false;
   const auto trajectory = [&](const char* run) {
@@ -114,7 +114,7 @@ bool are_copies(const BenchArguments& a, const Sequence& sequence, execution::Mo
   return first && second && *first == *second;
 }
 
-// Runs a sequence as often as requested, but not again if its runs are copies of each other.
+// Runs a sequence as often as requested, but stops if the runs are identical.
 Result<int> run_repeatedly(const BenchArguments& a, const Sequence& sequence, execution::Mode mode,
                            const std::stop_token& stop, SequenceResult& result, const std::function<Status()>& write) {
   int status = kExitOk;
@@ -209,7 +209,7 @@ void add_bench(CLI::App& app, int& exit_status) {
   verb->add_option("--against", a->against,
                    "compare with this earlier time.json; exit status 1 if a count differs or a time is slower")
       ->needs(time);
-  verb->add_option("--margin", a->margin_percent, "by how many percent a time may be slower")
+  verb->add_option("--margin", a->margin_percent, "tolerated increase of a time in percent")
       ->check(CLI::Range(0.0, 1000.0))
       ->capture_default_str()
       ->needs(time);

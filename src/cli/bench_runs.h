@@ -1,4 +1,4 @@
-// What the two forms of `bslam bench`, the table of many sequences and the times of one, have in common.
+// Common parts of the two forms of `bslam bench`: the table of many sequences, and the times of one.
 #pragma once
 
 #include <filesystem>
@@ -34,7 +34,7 @@ std::vector<std::string> run_words(const BenchArguments& arguments, const std::s
 // Name of the processor as the kernel reports it; empty if it does not.
 std::string processor_name();
 
-// Why a run has failed: its last message; empty if it has not.
+// The reason why a run failed, which is its last message; empty if it did not fail.
 std::string failure_of(const ProcessEnd& end, const std::filesystem::path& log);
 
 // Creates the folder of --out and checks that it may be written.

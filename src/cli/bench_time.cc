@@ -25,7 +25,7 @@ using Summary = nlohmann::ordered_json;
 // Counts are equal in all runs of this mode only, so that it is the default of --time.
 constexpr const char* kExactMode = "sequential";
 
-// How a run ended: its summary, or the exit status that it causes.
+// The result of a run: its summary, or the exit status of the benchmark.
 struct TimedRun {
   Summary summary;
   int status = kExitOk;

@@ -55,7 +55,7 @@ Error sentence_error(std::string sentence) {
   return error;
 }
 
-// What is before and behind a word in a text.
+// The parts of a text before and after a word.
 struct Parts {
   std::string before, behind;
 };
@@ -91,7 +91,7 @@ std::string kind_of_value(const CLI::App& verb, const std::string& option) {
   return type.find("INT") != std::string::npos ? "a whole number" : "a value";
 }
 
-// The parser's messages about the value of an option as what was found and what is expected; nullopt: another message.
+// Converts the parser's messages about the value of an option to `found` and `expected`; nullopt for other messages.
 std::optional<Error> value_error(const CLI::App& verb, const std::string& text) {
   if (const auto parts = parted(text, "Could not convert: ")) {
     const auto value = parted(parts->behind, " = ");

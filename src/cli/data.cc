@@ -31,7 +31,7 @@ void add_data(CLI::App& app, int& exit_status) {
   data->require_subcommand(1);
   const auto arguments = std::make_shared<InfoArguments>();
   CLI::App* info = data->add_subcommand(
-      "info", "print what is in a recording, which of it would be which camera, and what is missing for bslam run");
+      "info", "print the content of a recording, which stream is which camera, and what is missing for bslam run");
   add_dataset_options(*info, arguments->data);
   info->add_flag("--json", arguments->json, "print JSON");
   info->callback([arguments, &exit_status] { exit_status = data_info(*arguments); });

@@ -47,8 +47,7 @@ void add_image_options(CLI::App& verb, ImageArguments& a) {
       "image topics of a bag, or folders with images in DATA, in the order of the rig's cameras, separated by "
       "commas; default: all, by name");
   verb.add_flag("--side-by-side", a.side_by_side, "each image of the video consists of those of two cameras");
-  verb.add_option("--rate", a.rate_hz,
-                  "the time stamps of the images are their numbers, and they were taken at this rate [Hz]");
+  verb.add_option("--rate", a.rate_hz, "frame rate in Hz; the time stamps of the images are frame numbers");
   verb.add_option("--stamp-unit", a.stamp_unit, "unit of the time stamps; default: ns")
       ->check(CLI::IsMember({"ns", "us", "ms", "s"}));
   verb.add_option("--bayer", a.bayer,

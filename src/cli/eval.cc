@@ -50,7 +50,7 @@ void note_of_body(const camera::Rig& rig, const std::filesystem::path& file) {
              file.string());
 }
 
-// The plot is written as SVG, and so must its name say.
+// The plot is written as SVG, and its file name must end in .svg.
 Status check_plot_name(const std::optional<std::filesystem::path>& plot) {
   if (!plot || plot->extension().empty() || plot->extension() == ".svg" || plot->extension() == ".SVG") return {};
   return Error{"command line", "--plot", plot->string(), "a name that ends in .svg, the format that is written"};

@@ -29,7 +29,7 @@ using geometry::SE3;
 struct TrajectoryArguments {
   std::string file, out, format, frame, axes, stamps, up;
   std::optional<fs::path> rig, map, times;
-  std::optional<int> camera;  // of the rig file: that of the trajectory
+  std::optional<int> camera;  // camera of the rig file whose poses the trajectory contains
   bool overwrite = false;
 };
 
@@ -113,7 +113,7 @@ Status restore_stamps(const TrajectoryArguments& arguments, Trajectory& trajecto
   return {};
 }
 
-// T_cam_frame of the frame that is asked for and of the camera of the trajectory.
+// T_cam_frame of the requested frame and of the camera of the trajectory.
 Result<SE3> wanted_frame(const TrajectoryArguments& arguments) {
   const std::string& frame = arguments.frame;
   if (frame.empty() || (!arguments.camera && frame == frame_in_file(arguments))) return SE3();
@@ -160,7 +160,7 @@ std::string parent_frame(const TrajectoryArguments& arguments) {
   return arguments.map ? "map" : "world_ros";
 }
 
-// The comments of the exported file. Lengths that are not metres in the source are none here.
+// The comments of the exported file. If lengths are not metres in the source, they are not metres here either.
 std::string comments(const TrajectoryArguments& arguments, const std::string& frame) {
   const std::string whole_name = arguments.axes == "ros" ? frame + "_ros" : frame;
   std::string out = evaluation::trajectory_header(whole_name, evaluation::PoseState::kFinal, parent_frame(arguments));

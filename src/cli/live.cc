@@ -221,7 +221,7 @@ int run_live(const LiveArguments& a, const system::Config& config, const LiveRig
     }
     cameras.begin();
     if (a.duration_s) timer.emplace(*a.duration_s, [&cameras] { cameras.stop(); });
-    dataset.first_time_ns = cameras.wait_for_frame().value_or(*first_time_ns);  // of those that are processed
+    dataset.first_time_ns = cameras.wait_for_frame().value_or(*first_time_ns);  // time of the first processed frame
     return {};
   };
   input.after = [&] {
@@ -237,7 +237,7 @@ int run_live(const LiveArguments& a, const system::Config& config, const LiveRig
   return run_and_write(a.slam, std::move(input), control);
 }
 
-// Folders of images have nothing that could be set.
+// Folders of images have no settings.
 Status check_settings_of_cameras(const LiveArguments& a, const std::vector<std::string>& paths) {
   const auto folder = std::ranges::find_if(paths, is_folder);
   if (folder == paths.end()) return {};
@@ -296,8 +296,8 @@ void add_live(CLI::App& app, std::span<const char* const> command_line, int& exi
                    "/dev/video0,/dev/video2; - for a camera that is not used. Folders of images are played in place of "
                    "cameras");
   verb->add_option("--record", a->record,
-                   "write the images of all frames that are processed to this MCAP file, of which bslam run makes the "
-                   "same frames");
+                   "write the images of all processed frames to this MCAP file, from which bslam run creates the same "
+                   "frames");
   verb->add_option("--fps", a->fps, "frame rate to set; default: the highest up to 60 that the camera offers")
       ->check(CLI::Range(0.1, 1000.0));
   verb->add_option("--exposure", a->exposure,

@@ -1,4 +1,4 @@
-// The Python package, which carries out some commands.
+// Runs the commands that are implemented in the Python package.
 #pragma once
 
 #include <string>
@@ -8,7 +8,8 @@ namespace bslam::cli {
 // python3, or $BSLAM_PYTHON.
 std::string python_interpreter();
 
-// Code that is run with -c. Packages in the current folder, which -c would prefer, are not looked for.
+// Returns code to be run by python3 -c. The code does not import packages from the current folder, which -c would
+// otherwise prefer.
 std::string python_code(const std::string& statements);
 
 }  // namespace bslam::cli

@@ -10,7 +10,7 @@ namespace bslam::cli {
 
 namespace {
 
-// In how many submaps the poses are, and how many of them are in the loaded map.
+// Prints the number of submaps with poses, and how many poses are in the loaded map.
 std::string submaps_text(const session::RunRecord& record) {
   std::string text;
   if (record.submaps.size() > 1)
@@ -27,21 +27,21 @@ void print_reprojection(const session::RunRecord& record) {
     const session::CameraRecord& camera = record.cameras[c];
     const auto share = session::inlier_share(record, c);
     if (camera.residuals.observations == 0 || !share) continue;
-    const double rms_px = camera.residuals.rms_px;  // without meaning where landmarks are all but behind a camera
+    const double rms_px = camera.residuals.rms_px;  // meaningless if landmarks are almost behind a camera
     text += fmt::format("{}{} {} px ({:.0f} % inliers)", text.empty() ? "" : ", ", camera.name,
                         rms_px < kLargest_px ? fmt::format("{:.2f}", rms_px) : "over 100", 100 * *share);
   }
   if (!text.empty()) fmt::print("reprojection error: {}\n", text);
 }
 
-// What was estimated, beside the bound of the verdict, so that a verdict near the bound is seen.
+// Prints the estimate next to the threshold of the verdict, so that a verdict near the threshold is visible.
 std::string excess_text(const session::CalibrationRecord& calibration) {
   if (!calibration.estimate.done) return "";
   return fmt::format(" (mean squared error {:.1f} % above the best estimate's, bound {:.1f} %)",
                      100 * calibration.estimate.excess_error, 100 * calibration.excess_bound);
 }
 
-// Why the estimate of the calibration does not count.
+// The reason why the estimate of the calibration does not apply.
 std::string doubt_text(const session::RunRecord& record) {
   std::string text;
   for (const calibration::CameraPair& pair : record.calibration.pairs) {
@@ -63,7 +63,7 @@ std::string doubt_text(const session::RunRecord& record) {
   return text;
 }
 
-// Why the calibration could not be tested.
+// The reason why the calibration could not be tested.
 std::string_view untested_text(const session::RunRecord& record) {
   if (record.cameras.size() < 2) return "calibration: not tested, which takes several cameras: there is a single one";
   if (record.map.scale != "metric") return "calibration: not tested, which takes a map of metric scale";
@@ -71,7 +71,7 @@ std::string_view untested_text(const session::RunRecord& record) {
          "calibration.check is false";
 }
 
-// Whether the images agree with the calibration. Silence would be taken for agreement.
+// Prints whether the images agree with the calibration, in every case: no message would be understood as agreement.
 void print_verdict(const session::RunRecord& record) {
   const session::CalibrationRecord& calibration = record.calibration;
   if (calibration.foreign_images())

@@ -107,14 +107,14 @@ Result<std::optional<storage::SavedMap>> read_map(const SlamArguments& arguments
   return std::optional(*std::move(saved));
 }
 
-// What is stored with the map of a run. `map_warning`: what was wrong with the map that it continued.
+// The metadata stored with the map of a run. `map_warning`: the warning stored in the map that it continued.
 storage::MapFileInfo map_info(const session::RunRecord& record, const place::Vocabulary& vocabulary,
                               const std::string& map_warning) {
   const std::string warning = session::unreliable_map_text(record);
   return {vocabulary.id(), record.version, record.data, warning.empty() ? map_warning : warning};
 }
 
-// Writes all files that can be written. Returns what could not be.
+// Writes all files that can be written. Returns the errors of the others.
 std::vector<Error> write_files(const session::SessionResult& result, const system::Config& config,
                                const dataset::Dataset& dataset, const SlamArguments& arguments,
                                const storage::MapFileInfo& info) {
@@ -145,7 +145,7 @@ void note_report_size(session::SessionResult& result, const system::Config& conf
   session::add_largest(result.record.memory, "data of the report", data.size());
 }
 
-// What is wrong with a loaded map.
+// The warning about a loaded map.
 std::vector<std::string> warnings_of_map(const std::string& file, const std::string& warning) {
   if (warning.empty()) return {};
   return {file + ": the run that made this map has found: " + warning};
@@ -299,7 +299,7 @@ int run_and_write(const SlamArguments& arguments, RunInput input, session::RunCo
       arguments.rerun.empty() || !unwritten.empty() ? Status() : send_to_rerun(arguments.out, arguments.rerun);
   end_view(view->get(), *result, input.config, dataset, arguments);
   print_after(result->record, warnings, arguments);
-  std::fflush(stdout);  // the result comes before what could not be written
+  std::fflush(stdout);  // so that the result appears before the errors about files
   for (const Error& error : unwritten) report_error(error);
   if (!unwritten.empty()) return kExitBadInput;
   if (!sent) return report_error(sent.error());

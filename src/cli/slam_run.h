@@ -49,7 +49,7 @@ Status check_output_file(const std::string& file, const char* option, bool overw
 // file or viewer of --rerun.
 Status check_outputs(const SlamArguments& arguments);
 
-// What a run is made of beside its arguments.
+// The input of a run besides its command-line arguments.
 struct RunInput {
   system::Config config;
   const dataset::Dataset& dataset;  // without frames if there is a source

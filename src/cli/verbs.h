@@ -11,8 +11,8 @@
 namespace bslam::cli {
 
 constexpr int kExitOk = 0, kExitBadInput = 2, kExitNothingTracked = 3, kExitInterrupted = 130;
-constexpr int kExitFailed = 1;  // the program failed, not the request
-constexpr int kExitWorse = 1;   // of a comparison: slower than before, or other work
+constexpr int kExitFailed = 1;  // the program failed although the request was valid
+constexpr int kExitWorse = 1;   // result of a comparison: slower than before, or a different amount of work
 
 // `command_line`: the arguments of the program, which the report of a run shows.
 void add_run(CLI::App& app, std::span<const char* const> command_line, int& exit_status);

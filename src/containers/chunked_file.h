@@ -1,4 +1,4 @@
-// What ROS 1 bags and MCAP files have in common: messages in chunks, which may be compressed. Internal to this folder.
+// Common base of ROS 1 bags and MCAP files: messages in chunks, which may be compressed. Internal to this folder.
 #pragma once
 
 #include <cstddef>
@@ -17,8 +17,8 @@ namespace bslam::containers {
 
 struct Chunk {
   std::uint64_t at = 0;           // position of its data in the file
-  std::uint64_t stored_size = 0;  // bytes of it in the file, as far as they are there
-  std::uint64_t size = 0;         // bytes after decompression, as the file says
+  std::uint64_t stored_size = 0;  // bytes of it in the file; fewer if the file is truncated
+  std::uint64_t size = 0;         // bytes after decompression, according to the file
   Compression compression = Compression::kNone;
   std::uint32_t checksum = 0;  // CRC-32 of the decompressed data; 0: none
 };
@@ -34,7 +34,7 @@ class ChunkedFile : public MessageFile {
   void add_chunk(const Chunk& chunk);
   // Returns true from add_chunk to finish_chunk.
   bool has_open_chunk() const { return open_; }
-  // Keeps a message that the index of the open chunk names.
+  // Stores a message listed by the index of the open chunk.
   void add_index_entry(std::uint32_t topic, TimeNs received_ns, std::uint64_t at);
   // The index of the open chunk, if there is one, is damaged or incomplete: the chunk will be scanned.
   void note_damaged_index() { index_damaged_ = true; }
@@ -46,22 +46,22 @@ class ChunkedFile : public MessageFile {
 
   // Up to `count` bytes of the decompressed chunk from position `at`.
   std::string bytes(std::uint32_t chunk, std::uint64_t at, std::uint64_t count) const;
-  // How far `bytes` reaches.
+  // Number of bytes of the decompressed chunk that can be read.
   std::uint64_t available(std::uint32_t chunk) const;
   // Returns false if the chunk has a checksum that differs from that of its data.
   bool checksum_holds(std::uint32_t chunk) const;
 
-  // Positions of chunks that the index of the file names; used where the file between them is damaged.
+  // Positions of chunks according to the index of the file; used to continue after damaged parts of the file.
   std::vector<std::uint64_t> chunk_positions_;
 
   // Returns the position of the first chunk after `at` that the index names, or 0.
   std::uint64_t chunk_after(std::uint64_t at) const;
-  // Describes a damaged place, after which the file is read on at `next` (0: not at all).
+  // Notes that the file is damaged at `at`, and that reading continues at `next` (0: reading ends).
   void note_damage(std::uint64_t at, std::uint64_t next);
-  // Describes a chunk of which only the first bytes could be read.
+  // Notes that only the first bytes of a chunk could be read.
   void note_cut_chunk(std::uint32_t chunk, std::uint64_t good_bytes);
   // Turns the notes into warnings: of each kind the first, and how many there are. Warns as well of messages that
-  // belong to no topic, and if there are fewer chunks than the file says.
+  // belong to no topic, and if there are fewer chunks than the index lists.
   void finish_notes(std::uint64_t unknown_messages, std::uint64_t expected_chunks);
 
  private:
@@ -86,7 +86,7 @@ class ChunkedFile : public MessageFile {
 
   InputFile file_;
   std::vector<Chunk> chunks_;
-  bool open_ = false, index_damaged_ = false;  // of the last chunk
+  bool open_ = false, index_damaged_ = false;  // state of the last chunk
   std::vector<IndexEntry> entries_;
   Notes damaged_, cut_;
   mutable std::mutex mutex_;

@@ -25,7 +25,7 @@ std::string run(std::string_view in, std::size_t max_bytes, const Step& step) {
     std::size_t written = 0;
     more = step(in, out.data() + size, out.size() - size, written);
     size += written;
-    if (written == 0 && in.size() == left) break;  // the input is cut off
+    if (written == 0 && in.size() == left) break;  // the input is truncated
   }
   out.resize(size);
   return out;

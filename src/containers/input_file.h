@@ -1,4 +1,4 @@
-// A file that is read in places. Reading changes no state, so that several threads may do so.
+// A file with random access. Reading changes no state, so that several threads may read at the same time.
 #pragma once
 
 #include <cstddef>
@@ -23,7 +23,8 @@ class InputFile {
   const std::filesystem::path& path() const { return path_; }
   std::uint64_t size() const { return size_; }  // bytes, when it was opened
 
-  // Returns `count` bytes from position `at`, or those up to the end of the file. What cannot be read ends it as well.
+  // Returns `count` bytes from position `at`, or those up to the end of the file. Returns fewer bytes if a part cannot
+  // be read.
   std::string read(std::uint64_t at, std::uint64_t count) const;
 
  private:

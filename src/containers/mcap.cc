@@ -1,5 +1,6 @@
-// MCAP files: records of an opcode, a 64-bit length and data. A file is read record by record, without the data of its
-// chunks where an index of their messages follows, so that a file that is cut off is read in the same way.
+// MCAP files consist of records: an opcode, a 64-bit length and data. A file is read record by record from its
+// beginning, so that a truncated file is read in the same way. The data of a chunk is skipped if an index of its
+// messages follows.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -77,7 +78,7 @@ class McapFile : public ChunkedFile {
     if (record.op == 0 || record.data_size > std::uint64_t{1} << 62) return std::nullopt;
     return record;
   }
-  // All data of a record of limited size; empty if it is cut off or larger.
+  // Returns the data of a record; empty if it is truncated or larger than kMaxDataBytes.
   std::string data_of(std::uint32_t chunk, const Record& record) const {
     if (record.data_size > kMaxDataBytes) return {};
     std::string data = bytes(chunk, record.data_at, record.data_size);
@@ -95,8 +96,8 @@ class McapFile : public ChunkedFile {
   void scan_chunk(std::uint32_t chunk) override;
   bool read_record(std::uint64_t at, const Record& record);
 
-  std::map<std::uint16_t, std::string> schemas_;     // their names by number
-  std::map<std::uint16_t, std::uint32_t> topic_of_;  // by number of the channel
+  std::map<std::uint16_t, std::string> schemas_;     // names by schema id
+  std::map<std::uint16_t, std::uint32_t> topic_of_;  // topic index by channel id
   bool has_summary_ = false;
   std::uint64_t unknown_ = 0;
 };
@@ -148,7 +149,7 @@ void McapFile::add_metadata(std::string_view data) {
   }
 }
 
-// Reads the channels and the places of chunks from the end of the file.
+// Reads the channels and the offsets of the chunks from the summary section at the end of the file.
 void McapFile::read_summary() {
   constexpr std::uint64_t kFooterSize = kHead + 20, kEnd = kFooterSize + kMagic.size();
   const std::uint64_t size = file().size();
@@ -235,7 +236,7 @@ bool McapFile::add_index(const Record& record) {
   const std::uint32_t count = in.number<std::uint32_t>() / kEntry;
   if (!in.ok() || in.left() < std::uint64_t{count} * kEntry) return false;
   const auto topic = topic_of_.find(channel);
-  if (topic == topic_of_.end()) note_damaged_index();  // or the chunk describes the channel
+  if (topic == topic_of_.end()) note_damaged_index();  // the channel record may also be in the chunk
   for (std::uint32_t k = 0; topic != topic_of_.end() && k < count; ++k) {
     const auto time = in.number<std::uint64_t>() & ~(std::uint64_t{1} << 63);
     add_index_entry(topic->second, static_cast<TimeNs>(time), in.number<std::uint64_t>());
@@ -246,7 +247,7 @@ bool McapFile::add_index(const Record& record) {
 // Reads a record outside of chunks. Returns false if it is damaged.
 bool McapFile::read_record(std::uint64_t at, const Record& record) {
   const bool whole = record.end() <= file().size();
-  if (record.op == kChunkRecord) return add_chunk_of(record) && whole;  // the start of one that is cut off is read
+  if (record.op == kChunkRecord) return add_chunk_of(record) && whole;  // of a truncated chunk the beginning is read
   if (!whole) return false;
   if (record.op == kMessageIndex) return add_index(record);
   const bool small = record.data_size <= kMaxAttachmentBytes;

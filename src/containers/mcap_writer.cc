@@ -18,7 +18,7 @@ constexpr unsigned char kHeader = 1, kFooter = 2, kSchema = 3, kChannel = 4, kMe
                         kMessageIndex = 7, kChunkIndex = 8, kAttachment = 9, kAttachmentIndex = 10, kStatistics = 11,
                         kMetadata = 12, kMetadataIndex = 13, kDataEnd = 15;
 constexpr std::size_t kChunkBytes = std::size_t{4} << 20;
-constexpr int kLevel = 1;  // of zstd: images are noise mostly, and higher levels hardly find more
+constexpr int kLevel = 1;  // level of zstd; images are mostly noise, so that higher levels hardly compress better
 
 static_assert(std::endian::native == std::endian::little, "numbers are written as they lie in memory");
 
@@ -40,7 +40,7 @@ std::string record(unsigned char op, std::string_view data) {
   return out += data;
 }
 
-// The number of the type of a topic; 0 means none.
+// The id of the schema of a topic; 0 means none.
 std::uint16_t schema_of(std::size_t topic) { return static_cast<std::uint16_t>(topic + 1); }
 
 std::string compressed(std::string_view bytes) {
@@ -127,7 +127,7 @@ std::uint16_t McapWriter::add_topic(const std::string& name, const std::string& 
   return static_cast<std::uint16_t>(channels_.size() - 1);
 }
 
-// The record of the type of a topic. Every topic has a type of its own.
+// The schema record of a topic. Every topic has its own schema.
 std::string McapWriter::schema_record(std::size_t number) const {
   std::string out;
   append(out, schema_of(number));

@@ -27,7 +27,7 @@ class McapWriter {
   McapWriter(const McapWriter&) = delete;
   McapWriter& operator=(const McapWriter&) = delete;
 
-  // Adds a file, or names with values, before the first message. Errors: as of flush.
+  // Adds a file, or names with values, before the first message. Errors: those of flush.
   Status attach(const std::string& name, const std::string& media_type, std::string_view bytes);
   Status add_metadata(const std::string& name, const std::map<std::string, std::string>& values);
 
@@ -35,7 +35,7 @@ class McapWriter {
   std::uint16_t add_topic(const std::string& name, const std::string& type, const std::string& definition);
 
   // Adds a message, which was recorded at `time_ns`, to the chunk, and writes the chunk when it is full. Errors: as of
-  // flush; a time before 1970, which the format does not know.
+  // flush; a time before 1970, which the format cannot represent.
   Status write(std::uint16_t topic, TimeNs time_ns, std::string_view message);
   // Writes the chunk. Error: the disk is full or broken. All later calls return it as well and write nothing, so that
   // the file remains readable up to there.
@@ -43,7 +43,7 @@ class McapWriter {
   // Writes chunk and index. No call may follow.
   Status finish();
 
-  std::uint64_t bytes() const { return at_; }  // written so far
+  std::uint64_t bytes() const { return at_; }  // bytes written so far
 
  private:
   struct Channel {

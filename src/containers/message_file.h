@@ -21,15 +21,15 @@ enum class Serialisation { kRos1, kCdr, kProtobuf, kOther };
 struct Topic {
   std::string name;
   std::string type;           // such as sensor_msgs/Image; without the "/msg" of ROS 2
-  std::string serialisation;  // as the file names it, such as cdr
+  std::string serialisation;  // its name in the file, such as cdr
   Serialisation parsed_as = Serialisation::kOther;
-  std::uint64_t count = 0;           // of messages
-  TimeNs first_ns = 0, last_ns = 0;  // when the first and last were recorded
+  std::uint64_t count = 0;           // number of messages
+  TimeNs first_ns = 0, last_ns = 0;  // times at which the first and last message were recorded
 };
 
 // Where a message is in its file.
 struct MessageRef {
-  TimeNs received_ns = 0;   // when it was recorded
+  TimeNs received_ns = 0;   // time at which it was recorded
   std::uint64_t at = 0;     // position in the file, or in the decompressed chunk, or row of the table
   std::uint32_t chunk = 0;  // number of the chunk
   std::uint32_t topic = 0;  // index into topics()
@@ -42,7 +42,8 @@ struct Attachment {
 
 constexpr std::size_t kWholeMessage = std::numeric_limits<std::size_t>::max();
 
-// An open file: its topics, and where the messages with images and calibrations are. Messages are read when asked for.
+// An open file: its topics, and the positions of the messages with images and calibrations. Messages are read on
+// request.
 class MessageFile {
  public:
   virtual ~MessageFile() = default;
@@ -60,7 +61,7 @@ class MessageFile {
 
   // Returns the serialised message, or its first bytes up to `max_bytes` or somewhat more. A whole message is tested
   // against the checksum of its chunk, if it has one. May be called from several threads. Errors: the message is
-  // damaged or cut off.
+  // damaged or truncated.
   virtual Result<std::string> read(const MessageRef& message, std::size_t max_bytes) const = 0;
 
  protected:

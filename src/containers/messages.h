@@ -17,14 +17,15 @@ namespace bslam::containers {
 
 // sensor_msgs/Image, sensor_msgs/CompressedImage, foxglove.RawImage or foxglove.CompressedImage.
 struct ImageMessage {
-  TimeNs stamp_ns = 0;  // of its header; 0 if it was not set
+  TimeNs stamp_ns = 0;  // time stamp of its header; 0 if it was not set
   std::string frame_id;
   bool compressed = false;
-  std::string encoding;                 // of the pixels, such as mono8; of a compressed image its format, such as jpeg
+  std::string encoding;  // encoding of the pixels, such as mono8; for a compressed image its format, such as jpeg
   std::uint32_t width = 0, height = 0;  // pixels; 0 for compressed images
   std::uint32_t step = 0;               // bytes from one row to the next
-  bool big_endian = false;              // of values with 16 bits
-  std::uint64_t data_at = 0, data_size = 0;  // where the pixels are in the message; it may end before them
+  bool big_endian = false;              // byte order of 16-bit values
+  // Position of the pixels in the message, which may be truncated before them.
+  std::uint64_t data_at = 0, data_size = 0;
 };
 
 // sensor_msgs/CameraInfo or foxglove.CameraCalibration.

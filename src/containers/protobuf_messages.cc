@@ -14,9 +14,9 @@ constexpr std::size_t kMaxCoefficients = 1000;
 struct Field {
   std::uint32_t number = 0;
   std::uint32_t wire = 0;   // 0 varint, 1 fixed 64 bits, 2 counted bytes, 5 fixed 32 bits
-  std::uint64_t value = 0;  // of fixed and varint fields; of counted ones the number of bytes
-  std::string_view bytes;   // of counted fields, as far as they are there
-  std::uint64_t at = 0;     // where the bytes begin in the message
+  std::uint64_t value = 0;  // value of a fixed or varint field; number of bytes of a length-delimited field
+  std::string_view bytes;   // bytes of a length-delimited field, as far as they are present
+  std::uint64_t at = 0;     // offset of the bytes in the message
 };
 
 std::uint64_t varint(ByteReader& in) {
@@ -30,7 +30,7 @@ std::uint64_t varint(ByteReader& in) {
   return 0;
 }
 
-// Returns the next field, or nullopt at the end or if it is damaged. The bytes of a field may be cut off.
+// Returns the next field, or nullopt at the end or if it is damaged. The bytes of a field may be truncated.
 std::optional<Field> next_field(ByteReader& in) {
   if (in.left() == 0) return std::nullopt;
   const std::uint64_t tag = varint(in);

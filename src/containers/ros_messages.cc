@@ -26,7 +26,7 @@ class RosReader {
     return std::string(cdr_ && bytes.ends_with('\0') ? bytes.substr(0, bytes.size() - 1) : bytes);
   }
   void header(TimeNs& stamp_ns, std::string& frame_id) {
-    if (!cdr_) number<std::uint32_t>();  // counts the messages
+    if (!cdr_) number<std::uint32_t>();  // sequence number
     // ROS 1 has no negative seconds, and ROS 2 none after 2038.
     const TimeNs seconds = cdr_ ? number<std::int32_t>() : static_cast<TimeNs>(number<std::uint32_t>());
     stamp_ns = std::clamp(seconds, -kMaxSeconds, kMaxSeconds) * 1'000'000'000 + number<std::uint32_t>();

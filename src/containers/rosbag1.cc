@@ -1,6 +1,6 @@
-// ROS 1 bags, format 2.0: records, each with a header of fields "name=value" and data. A bag is read record by record,
-// without the data of its chunks where an index of their messages follows, so that a bag without index, whose recorder
-// was killed, is read in the same way.
+// ROS 1 bags, format 2.0: records, each with a header of fields "name=value" and data. A bag is read record by record
+// from its beginning, so that a bag without an index, whose recorder was killed, is read in the same way. The data of a
+// chunk is skipped if an index of its messages follows.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -19,7 +19,7 @@ namespace {
 constexpr std::uint64_t kMaxHeaderBytes = std::uint64_t{1} << 20, kMaxDataBytes = std::uint64_t{1} << 26;
 constexpr unsigned char kMessage = 2, kBagHeader = 3, kIndex = 4, kChunk = 5, kChunkInfo = 6, kConnection = 7;
 
-// The fields of a header; the last one counts if a name is there twice.
+// The fields of a header; if a name occurs twice, the last one is used.
 using Fields = std::map<std::string, std::string, std::less<>>;
 
 std::optional<Fields> parse_fields(std::string_view header) {
@@ -79,7 +79,7 @@ class RosBag1 : public ChunkedFile {
   }
 
  private:
-  // The record at a position of a chunk; nullopt if it is not complete up to its data. The data may be cut off.
+  // Returns the record at a position in a chunk; nullopt if its header is incomplete. The data may be truncated.
   std::optional<Record> record_at(std::uint32_t chunk, std::uint64_t at) const {
     constexpr std::uint64_t kMostHeaders = 512;
     std::string head = bytes(chunk, at, kMostHeaders);
@@ -103,7 +103,7 @@ class RosBag1 : public ChunkedFile {
   void add_record(std::uint32_t chunk, std::uint64_t at, const Record& record);
   void scan_chunk(std::uint32_t chunk) override;
 
-  std::map<std::uint32_t, std::uint32_t> topic_of_;  // by number of the connection
+  std::map<std::uint32_t, std::uint32_t> topic_of_;  // topic index by connection id
   bool has_index_ = false;                           // its connections are known before its chunks
   std::uint64_t expected_chunks_ = 0, unknown_ = 0;
 };
@@ -123,7 +123,8 @@ void RosBag1::add_connection(std::uint32_t chunk, const Record& record) {
   if (same == topics_.end()) topics_.push_back({name, type, "ros1", Serialisation::kRos1, 0, 0, 0});
 }
 
-// Reads the connections and the places of chunks from the end of the bag, where the bag header says.
+// Reads the connections and the offsets of the chunks from the index at the end of the bag, whose position is in the
+// bag header.
 void RosBag1::read_index_section(const Record& bag_header) {
   const auto at = number<std::uint64_t>(bag_header.fields, "index_pos");
   const auto connections = number<std::uint32_t>(bag_header.fields, "conn_count");
@@ -190,7 +191,7 @@ bool RosBag1::add_index(const Record& record) {
   if (!conn || !count || record.data_size != *count * kEntry || record.data_size > kMaxDataBytes) return false;
   const std::string data = bytes(0, record.data_at, record.data_size);
   const auto topic = topic_of_.find(*conn);
-  if (topic == topic_of_.end()) note_damaged_index();  // or the chunk describes the connection
+  if (topic == topic_of_.end()) note_damaged_index();  // the connection record may also be in the chunk
   ByteReader in(data);
   for (std::uint32_t k = 0; topic != topic_of_.end() && k < *count && in.left() >= kEntry; ++k) {
     const auto time = in.number<std::uint64_t>();
@@ -202,7 +203,7 @@ bool RosBag1::add_index(const Record& record) {
 // Reads a record outside of chunks. Returns false if it is damaged.
 bool RosBag1::read_record(std::uint64_t at, const Record& record) {
   const bool whole = record.end() <= file().size();
-  if (record.op == kChunk) return add_chunk_of(record) && whole;  // the start of a chunk that is cut off is read
+  if (record.op == kChunk) return add_chunk_of(record) && whole;  // of a truncated chunk the beginning is read
   if (!whole) return false;
   if (record.op == kBagHeader) read_index_section(record);
   if (record.op == kConnection) add_connection(0, record);

@@ -41,7 +41,7 @@ std::string text(sqlite3_stmt* row, int column) {
   return bytes == nullptr ? "" : std::string(bytes, static_cast<std::size_t>(sqlite3_column_bytes(row, column)));
 }
 
-// The names of files may contain what a URI would read as its own.
+// Escapes a file name for use in a URI.
 std::string uri_of(const std::filesystem::path& path) {
   std::string uri = "file:";
   for (const unsigned char c : path.string())
@@ -105,7 +105,7 @@ class SqliteBag : public MessageFile {
   mutable std::mutex mutex_;
 };
 
-// Views and virtual tables would run what an untrusted file says.
+// Views and virtual tables could execute code from an untrusted file.
 bool has_plain_table(sqlite3* database, const char* name) {
   const Statement row = prepare(database, "SELECT type, sql FROM sqlite_schema WHERE name = ?");
   if (!row) return false;
@@ -174,7 +174,7 @@ Status SqliteBag::index(const InputFile& file) {
   std::uint64_t seen = 0, unknown = 0;
   int status = SQLITE_ROW;
   while ((status = sqlite3_step(rows.get())) == SQLITE_ROW) {
-    // A damaged tree may come back to rows that were read.
+    // In a damaged tree the iteration may return to rows that were already read.
     if (++seen > file.size()) break;
     const auto topic = topic_of_.find(sqlite3_column_int64(rows.get(), 1));
     if (topic == topic_of_.end()) {

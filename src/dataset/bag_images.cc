@@ -47,7 +47,7 @@ const Encoding* find_encoding(std::string_view name) {
   return found == std::end(kEncodings) ? nullptr : &*found;
 }
 
-constexpr std::size_t kBeginning = 512;  // bytes that contain all before the pixels, unless names are very long
+constexpr std::size_t kBeginning = 512;  // bytes that contain everything before the pixels, unless names are very long
 constexpr std::uint32_t kMaxSidePx = 20000;
 
 }  // namespace

@@ -13,22 +13,22 @@
 
 namespace bslam::dataset {
 
-// One image of a topic, as its message says.
+// One image of a topic, described by the beginning of its message.
 struct BagImage {
-  TimeNs stamp_ns = 0;  // of the header; 0: not set
+  TimeNs stamp_ns = 0;  // time stamp of the header; 0: not set
   TimeNs received_ns = 0;
-  std::int64_t entry = 0;  // in the store
+  std::int64_t entry = 0;  // its index in the store
 };
 
 // A topic of images of a recording, which may be spread over several files.
 struct ImageTopic {
   std::string name, type;
-  std::string encoding;          // of the first image: of its pixels, or the format of a compressed image
+  std::string encoding;          // encoding of the first image's pixels, or the format of a compressed image
   int width = 0, height = 0;     // pixels of the first image; 0 if they cannot be found
   std::vector<BagImage> images;  // in the order in which they were recorded
   std::size_t unreadable = 0;    // messages whose beginning cannot be read, which have no time
   std::size_t other_sizes = 0;   // images with another size or encoding than the first one
-  std::string unusable;          // why its images cannot be read; empty if they can
+  std::string unusable;          // reason why its images cannot be read; empty if they can
 };
 
 // The messages of a recording.

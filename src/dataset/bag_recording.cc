@@ -47,7 +47,7 @@ std::string camera_name(const std::string& topic) {
   return name.empty() ? "camera" : name;
 }
 
-// Images of this topic are rectified: not K and D but P describes them.
+// Returns true if images of this topic are rectified, so that P describes them instead of K and D.
 bool is_rectified(const std::string& topic) {
   const std::string last = topic.substr(namespace_of(topic).size());
   return last.starts_with("/image_rect") && !last.starts_with("/image_rect_raw");
@@ -184,7 +184,7 @@ Status BagRecording::choose_requested(const std::vector<std::string>& requested,
   return {};
 }
 
-// Two cameras at most have a calibration here (body_from_cam), so that a number tells them apart.
+// At most two cameras have a calibration here (body_from_cam), so that a number identifies them.
 std::string BagRecording::name_of(std::size_t camera) const {
   const std::string name = camera_name(topics_[cameras_[camera]].name);
   for (std::size_t other = 0; other < cameras_.size(); ++other) {
@@ -362,7 +362,7 @@ RecordingResult open_bag(const std::vector<fs::path>& paths, const std::vector<s
       opened.push_back(*std::move(one));
       continue;
     }
-    if (!folder) return one.error();  // files that were named are wanted
+    if (!folder) return one.error();  // files that were requested by name must be readable
     if (!first_error) first_error = one.error();
     warnings.push_back(one.error().message() + "; the file is not read");
   }

@@ -27,7 +27,7 @@ std::vector<int> folders_by_name(const std::vector<std::string>& folders, const 
   return out;
 }
 
-// For messages: where the calibration is from.
+// Text for messages: the source of the calibration.
 std::string origin_of(const DatasetRequest& request) {
   return request.rig_file ? request.rig_file->string() : request.rig_of_map ? "the map" : "the calibration";
 }
@@ -38,8 +38,9 @@ std::string names_of(const camera::Rig& rig) {
   return fmt::format("{}", fmt::join(names, ", "));
 }
 
-// Returns true if the recording has just the cameras that are selected: a single folder, or folders that are named in
-// the order of cameras of which there are none of these numbers.
+// Returns true if the recording contains only the selected cameras: there is one selected camera per folder, and either
+// the recording is a single folder, or the folders were requested by name and not all selected numbers are numbers of
+// folders.
 bool are_those_selected(const DatasetRequest& request, const Recording& recording, const std::vector<int>& cameras) {
   const std::size_t count = recording.camera_count();
   if (request.cameras.empty() || cameras.size() != count) return false;
@@ -47,7 +48,7 @@ bool are_those_selected(const DatasetRequest& request, const Recording& recordin
   return request.topics.empty() ? count == 1 && recording.has_own_names() : others;
 }
 
-// The order of names tells nothing if they are not one for each camera.
+// The order of the names does not identify the cameras unless there is one name per camera.
 Error unknown_order(const DatasetRequest& request, const Recording& recording, const std::vector<std::string>& folders,
                     const camera::Rig& rig) {
   for (std::size_t c = 0; c < recording.camera_count(); ++c) {

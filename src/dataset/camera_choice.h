@@ -12,11 +12,11 @@
 namespace bslam::dataset {
 
 struct ChosenRig {
-  std::vector<int> cameras;  // their numbers in the whole rig
+  std::vector<int> cameras;  // their indices in the whole rig
   camera::Rig rig;
   std::optional<camera::Rig> whole;
   std::vector<std::string> warnings;
-  std::vector<int> recorded = {};  // their numbers in the recording
+  std::vector<int> recorded = {};  // their indices in the recording
   bool by_name = false;            // the recorded cameras were found by the names of the rig
 };
 
@@ -27,14 +27,14 @@ Result<std::vector<int>> chosen_cameras(const std::vector<int>& requested, std::
 std::optional<std::filesystem::path> rig_file_in_folder(const DatasetRequest& request);
 
 struct RecordedCameras {
-  std::vector<int> numbers;  // in the recording, one for each of the cameras of the rig
+  std::vector<int> numbers;  // indices in the recording, one per camera of the rig
   bool by_name = false;
 };
 
 // Finds `cameras` of a rig in a recording: folders with the names of the cameras, or else the folders in their order.
-// If cameras are selected, a single folder or folders that are requested by name may be as many as these.
-// Errors: folders with names of their own of which only some are those of cameras, or which are not as many as the
-// rig has; images of too few cameras.
+// If cameras are selected, the number of folders may also equal the number of selected cameras, if there is one folder
+// or the folders are requested by name. Errors: folders with names of their own of which only some are those of
+// cameras, or which are not as many as the rig has; images of too few cameras.
 Result<RecordedCameras> recorded_cameras(const DatasetRequest& request, const Recording& recording,
                                          const camera::Rig& rig, const std::vector<int>& cameras);
 

@@ -98,7 +98,7 @@ std::string not_used(const fs::path& data, const std::vector<std::string>& names
                      why);
 }
 
-// Says which other folders have images.
+// Returns a note that lists the other folders with images.
 void warn_of_others(const fs::path& data, CameraFolders& out) {
   std::vector<std::string> others;
   for (const CameraFolder& folder : all_folders(data)) {

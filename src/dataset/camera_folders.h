@@ -10,7 +10,7 @@
 namespace bslam::dataset {
 
 struct CameraFolder {
-  std::string name;              // of the sub-folder, which may be that of a camera in the rig file
+  std::string name;              // name of the sub-folder, which may be the name of a camera in the rig file
   std::filesystem::path images;  // the folder itself, or the only folder with images in it
 };
 

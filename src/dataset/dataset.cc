@@ -74,7 +74,7 @@ std::vector<image_decoding::PixelFormat> pixel_formats(const DatasetRequest& req
   return formats;
 }
 
-// A camera that never captures while camera 0 does has another clock.
+// A camera without any image during the recording of camera 0 has another clock.
 Status check_common_clock(const std::vector<image_files::ImageFile>& images,
                           const std::vector<image_files::ImageFile>& reference, const std::string& name,
                           const camera::Camera& camera0, const fs::path& path) {
@@ -207,7 +207,7 @@ void take_names(const fs::path& file, std::size_t camera_count, ChosenRig& chose
   if (chosen.whole && chosen.whole->size() == all.size()) chosen.whole = with_names(*chosen.whole, all);
 }
 
-// A recording may have a part of the rig with which it was made: its cameras have the numbers that they had there.
+// A recording may contain a part of the rig with which it was made. Its cameras then keep their numbers in that rig.
 void number_as_recorded(const Recording& recording, Dataset& dataset) {
   for (int& camera : dataset.cameras_used) {
     const int number = recording.number_in_rig(static_cast<std::size_t>(camera));
@@ -216,7 +216,7 @@ void number_as_recorded(const Recording& recording, Dataset& dataset) {
   }
 }
 
-// Sets what the values of pixels mean: the formats of the images and the vignettes of the cameras.
+// Sets the meaning of pixel values: the formats of the images and the vignettes of the cameras.
 Status describe_pixels(const DatasetRequest& request, const std::vector<std::vector<image_files::ImageFile>>& images,
                        Dataset& dataset) {
   if (!(request.bayer.size() <= 1 || request.bayer.size() == images.size())) {
@@ -231,7 +231,7 @@ Status describe_pixels(const DatasetRequest& request, const std::vector<std::vec
   return {};
 }
 
-// Time stamps have a unit that is not known, unless the recording has times.
+// The unit of time stamps is unknown unless the recording defines it.
 Status check_time_stamps(const DatasetRequest& request, const OpenRecording& opened) {
   const TimeStampOptions& options = request.time_stamps;
   if (!opened.recording->has_times() || !(options.rate_hz || options.unit_ns)) return {};

@@ -33,7 +33,7 @@ struct DatasetRequest {
   std::optional<camera::Rig> rig_of_map = {};
   // Of bags image topics, of the format kFolder sub-folders, in the order of the cameras; empty: all, by name.
   std::vector<std::string> topics = {};
-  bool side_by_side = false;                       // of a video: each of its images is those of two cameras
+  bool side_by_side = false;                       // for a video: each image contains those of two cameras side by side
   std::vector<int> cameras = {};                   // in this order; the first becomes camera 0; empty: all
   double sync_tolerance_s = 0.002;                 // largest time difference within a frame, see IoOptions
   std::optional<double> begin_s = {}, end_s = {};  // seconds from the first frame: begin <= t < end

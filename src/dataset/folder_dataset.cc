@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 // The images of a camera, with numbers or with times.
 struct CameraImages {
   image_files::ImageList list;
-  std::string times_from;  // what the times are from; empty: names
+  std::string times_from;  // source of the times; empty: file names
   bool unit_is_known = false;
   std::string left_out = {};
   std::size_t left_out_count = 0;

@@ -19,23 +19,25 @@ Status check_images(const std::vector<image_files::ImageFile>& images, const cam
 // Adds a warning that is not there yet.
 void add_once(const std::string& warning, std::vector<std::string>& warnings);
 
-// For messages, if images have the shape but not the size of those that are calibrated: which part of the resolution
-// they have. Empty otherwise.
+// Text for messages: the ratio of the image size to the calibrated resolution, if the aspect ratio is the same but the
+// size differs; otherwise empty.
 std::string resolution_hint(int width, int height, const camera::Camera& camera);
 
-// Says how many images are listed but not there, and which is the first; nullopt if none are missing, or all.
+// Returns a message with the number of listed images that do not exist and the first of them; nullopt if none or all
+// are missing.
 std::optional<std::string> absent_warning(const std::vector<image_files::ImageFile>& images);
 
-// Warns of a part of the recording in which two series of images, each of the usual interval, alternate: names that are
-// time stamps do not tell the order in which images were taken if the clock was set back. nullopt if there is none.
+// Returns a warning if two series of images, each with the usual interval, alternate in a part of the recording. This
+// happens if the clock was set back: file names that are time stamps then do not show the order of capture. Otherwise
+// nullopt.
 std::optional<std::string> interleaved_warning(const std::vector<image_files::ImageFile>& images);
 
 // Checks that no two cameras have the same images: several of their first ones in a row, except those of one value
 // everywhere, which may be equal by chance.
 Status check_different_images(const std::vector<std::vector<image_files::ImageFile>>& images);
 
-// Tries to decode a few images spread over the recording. Returns a note that says how many cannot be decoded, and
-// which is the first; nullopt if all can.
+// Tries to decode a few images spread over the recording. Returns a note with the number of images that cannot be
+// decoded and the first of them; nullopt if there are none.
 std::optional<std::string> unreadable_note(const std::vector<image_files::ImageFile>& images);
 
 }  // namespace bslam::dataset

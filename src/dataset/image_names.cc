@@ -100,7 +100,8 @@ std::vector<std::size_t> varying_numbers(const Group& group) {
       varying.push_back(k);
   }
   if (!varying.empty()) return varying;
-  const auto longest = std::ranges::max_element(group.front().numbers, {}, &std::string::size);  // of a single image
+  // Numbers in the name of a single image.
+  const auto longest = std::ranges::max_element(group.front().numbers, {}, &std::string::size);
   return {static_cast<std::size_t>(longest - group.front().numbers.begin())};
 }
 

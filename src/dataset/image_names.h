@@ -1,4 +1,4 @@
-// Images of a folder in the order that their names tell: by a number, or by decimal seconds.
+// The images of a folder, ordered by the numbers or decimal seconds in their names.
 #pragma once
 
 #include <filesystem>
@@ -21,7 +21,7 @@ bool naturally_before(const std::string& a, const std::string& b);
 struct NamedImages {
   std::vector<image_files::ImageFile> images;  // in the order of time_ns: the number in the name, or nanoseconds
   bool in_seconds = false;                     // the names are decimal seconds, so that time_ns are nanoseconds
-  std::string left_out = {};                   // one of the files that are not used
+  std::string left_out = {};                   // an example of the files that are not used
   std::size_t left_out_count = 0;
 };
 
@@ -29,8 +29,8 @@ struct NamedImages {
 // before and behind them. Two of them with a point between are decimal seconds. Files with other names are left out if
 // they are single ones, or if others have names of digits only. Digits behind the point that are not as many in all
 // names are decimals without zeros at their ends, or whole numbers of ns, us or ms without zeros at their beginnings,
-// whichever is possible or gives nearly equal intervals. Errors: no images; names of several kinds; names in
-// which several numbers differ; fractions of a second of which it cannot be told what they are.
+// whichever is possible or gives nearly equal intervals. Errors: no images; names of several kinds; names in which
+// several numbers differ; fractions of a second whose unit is ambiguous.
 Result<NamedImages> images_by_name(const std::filesystem::path& folder,
                                    const std::vector<std::filesystem::path>& files);
 

@@ -16,10 +16,10 @@ constexpr const char* kLiveMetadata = "bslam.live";  // name of the metadata
 constexpr const char* kLiveRigFile = "rig.yaml";     // name of the attachment, in the format of bslam
 
 struct LiveRecording {
-  std::vector<std::string> topics;         // of the cameras of the rig, in its order
-  std::vector<int> numbers;                // as many: the cameras of the rig file that they were
-  std::vector<camera::RigCamera> cameras;  // as many; empty if the rig cannot be read
-  std::vector<std::string> warnings;       // for the user: why the rig cannot be read
+  std::vector<std::string> topics;         // topics of the cameras of the rig, in its order
+  std::vector<int> numbers;                // for each topic: index of the camera in the rig file
+  std::vector<camera::RigCamera> cameras;  // for each topic: the calibration; empty if the rig cannot be read
+  std::vector<std::string> warnings;       // reasons for the user why the rig cannot be read
 
   // Returns the calibration of a topic, or nullptr.
   const camera::RigCamera* camera_of(const std::string& topic) const;

@@ -26,7 +26,7 @@ std::optional<DatasetFormat> known_format(const fs::path& folder) {
 }
 
 std::vector<fs::path> folders_in(const fs::path& folder) {
-  constexpr std::size_t kMost = 100;  // that are looked at
+  constexpr std::size_t kMost = 100;  // number of entries that are examined
   std::vector<fs::path> out;
   std::error_code error;
   for (fs::directory_iterator it(folder, error), end; !error && it != end && out.size() < kMost; it.increment(error)) {

@@ -22,7 +22,7 @@ class Recording {
   virtual std::size_t camera_count() const = 0;
   // Returns true if the data set contains the calibration of at least one camera.
   virtual bool calibrated() const { return true; }
-  // Says what the calibration in it is, such as "CameraInfo of a bag"; empty if it has a format of rig files.
+  // Describes the calibration in the data set, such as "CameraInfo of a bag"; empty if it is in a format of rig files.
   virtual std::string calibration_origin() const { return {}; }
   // Returns the calibration in the data set.
   virtual Result<camera::RigCamera> calibration(std::size_t camera) const = 0;
@@ -33,14 +33,14 @@ class Recording {
   virtual std::optional<std::filesystem::path> ground_truth() const { return std::nullopt; }
   // Returns true if its time stamps have a known unit.
   virtual bool has_times() const { return false; }
-  // For the user: where the time stamps of a camera are from.
+  // Source of the time stamps of a camera, as text for the user.
   virtual std::string stamps_from(std::size_t) const { return has_times() ? "times.txt" : "names or data.csv"; }
   // Returns the names of the folders of all cameras, which may be those of cameras in the rig file; empty if they have
   // none, or the order of the cameras was requested.
   virtual std::vector<std::string> folder_names() const { return {}; }
-  // Returns true if these names tell no order of the cameras.
+  // Returns true if the order of the cameras does not follow from these names.
   virtual bool has_own_names() const { return false; }
-  // For the user: what was found damaged or missing when the recording was opened.
+  // Messages for the user about damaged or missing parts found when the recording was opened.
   virtual std::vector<std::string> warnings() const { return {}; }
   // Describes the images of the cameras, and what else the recording contains. Warnings and what is missing are added
   // by the caller.
@@ -75,6 +75,6 @@ bool looks_like_euroc(const std::filesystem::path& folder);
 bool looks_like_kitti(const std::filesystem::path& folder);
 bool looks_like_kitti_raw(const std::filesystem::path& folder);
 bool looks_like_folder(const std::filesystem::path& folder);      // camN, or left and right
-bool has_folders_of_images(const std::filesystem::path& folder);  // of any names
+bool has_folders_of_images(const std::filesystem::path& folder);  // folders with any names
 
 }  // namespace bslam::dataset

@@ -51,7 +51,7 @@ std::vector<SynchronyDescription> synchrony(const std::vector<StreamDescription>
   return out;
 }
 
-// What is needed to run the recording beside its images.
+// Returns the input that is needed to run the recording besides its images.
 std::vector<std::string> missing_for(const DatasetRequest& request, const Recording& recording,
                                      const std::vector<StreamDescription>& streams) {
   std::vector<std::string> missing;
@@ -65,7 +65,7 @@ std::vector<std::string> missing_for(const DatasetRequest& request, const Record
                       rig->size(), request.rig_file->string(), rig->size(), recording.camera_count()));
     }
     for (const StreamDescription& s : streams) {
-      const auto c = static_cast<std::size_t>(s.camera);  // of the run
+      const auto c = static_cast<std::size_t>(s.camera);  // index in the run
       const std::size_t of_rig = request.cameras.empty()      ? c
                                  : c < request.cameras.size() ? static_cast<std::size_t>(request.cameras[c])
                                                               : rig->size();
@@ -138,7 +138,7 @@ void try_images(const DatasetRequest& request, const Recording& recording, Recor
   if (const Status s = check_different_images(images); !s) out.missing.push_back(s.error().message());
 }
 
-// Returns the number in the recording of each camera of the run; nullopt if it cannot be told.
+// Returns the number in the recording of each camera of the run; nullopt if it cannot be determined.
 std::optional<std::vector<int>> cameras_of_run(const DatasetRequest& request, const Recording& recording,
                                                RecordingDescription& out) {
   DatasetRequest with_rig = request;
@@ -168,7 +168,7 @@ void number_cameras(const DatasetRequest& request, const Recording& recording, R
   }
 }
 
-// Opens the recording as `run` does: nothing else is missing for it, or it says what is.
+// Opens the recording as `run` does. Its error tells what else is missing.
 void try_to_open(const DatasetRequest& request, const OpenRecording& opened, RecordingDescription& out) {
   const auto dataset = dataset_of(request, opened);
   if (!dataset) {

@@ -68,7 +68,7 @@ Result<std::vector<Line>> read_lines(const fs::path& file) {
 
 bool is_whole(const Line& line) { return line.time.find_first_of(".eE") == std::string::npos; }
 
-// Times that no camera has are in another unit.
+// Returns true if the times are impossible for a camera, so that they are in another unit.
 Status check_interval(const TimeList& list, bool whole) {
   if (list.times_ns.size() < 2) return {};
   const TimeNs interval_ns = image::median_interval(list.times_ns);

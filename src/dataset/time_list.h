@@ -14,7 +14,7 @@ namespace bslam::dataset {
 struct TimeList {
   std::filesystem::path file;
   std::vector<TimeNs> times_ns;
-  std::vector<std::string> names;  // as many as times, or none
+  std::vector<std::string> names;  // one per time, or none
   bool in_seconds = true;          // else whole nanoseconds, or whole numbers of the unit that is given
 };
 

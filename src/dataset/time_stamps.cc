@@ -42,7 +42,7 @@ std::string other_option(TimeNs interval) {
   return interval >= kShortestInterval ? "no --stamp-unit if they are nanoseconds" : likely_option(interval);
 }
 
-// A unit in which a camera would take impossibly many or few images is a wrong one.
+// Returns true if the unit is wrong, because the frame rate of the camera would be impossibly high or low.
 Status check_unit(const TimeStampOptions& options, const std::string& source, TimeNs interval,
                   const std::vector<image_files::ImageFile>& images) {
   const bool as_they_are = options.unit_ns == TimeNs{1};

@@ -18,8 +18,8 @@ using geometry::Vector6d;
 constexpr int kDistances = 13;           // number of initial distances, equidistant in their logarithm
 constexpr double kMinSigma = 1e-5;       // rad, minimum standard deviation of a bearing
 constexpr double kMinCondition = 1e-12;  // minimum condition of the normal equations; if smaller, it is not observable
-// A motion is excluded if its cost is higher than the best one's by that of three standard deviations, with ten
-// correlated pairs for the information of one.
+// A motion is excluded if its cost exceeds the best cost by that of three standard deviations, where ten correlated
+// pairs carry as much information as one.
 constexpr double kExcludingSigmas = 3.0, kCorrelatedPairs = 10.0;
 
 // `cost`: half the sum of squared angles, each at most the square of the knee.

@@ -11,7 +11,7 @@ namespace bslam::estimators {
 namespace {
 
 struct PlaneMatch {
-  Eigen::Vector3d normal, b;  // of the epipolar plane, in b as given; bearing in b
+  Eigen::Vector3d normal, b;  // normal of the epipolar plane in camera b as calibrated; bearing in camera b
 };
 
 std::vector<PlaneMatch> plane_matches(const EpipolarPose& given, std::span<const BearingPair> pairs) {

@@ -13,7 +13,7 @@ struct PairRotationOptions {
 
 struct PairRotation {
   Eigen::Matrix3d correction = Eigen::Matrix3d::Identity();  // R_b_a = correction * R_b_a as given, t_b_a likewise
-  double angle = 0;                                          // of the correction, rad
+  double angle = 0;                                          // angle of the correction, rad
   // Matches that agree without and with the correction: on the epipolar plane, and in front of both cameras or too far
   // away to have a depth. `with_depth`: those of the latter that are not too far away.
   int agreed = 0, agree = 0, with_depth = 0;
@@ -27,9 +27,9 @@ struct EpipolarAgreement {
 EpipolarAgreement epipolar_agreement(const EpipolarPose& pose, std::span<const BearingPair> pairs, double tolerance);
 
 // Minimises the distances of the bearings b from the epipolar planes of a, by iteratively reweighted least squares with
-// the weights of Geman and McClure, whose scale decreases from several degrees to the tolerance. What the matches do
-// not tell, mostly the rotation that changes disparities, remains as given. More than half of
-// the pairs must be correct.
+// the weights of Geman and McClure, whose scale decreases from several degrees to the tolerance. Directions that the
+// matches do not determine, mainly the rotation that changes disparities, stay as given because of the prior. More than
+// half of the pairs must be correct.
 PairRotation pair_rotation(const EpipolarPose& given, std::span<const BearingPair> pairs,
                            const PairRotationOptions& options);
 

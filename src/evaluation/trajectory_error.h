@@ -53,7 +53,7 @@ struct PoseError {
 };
 
 struct TrajectoryEvaluation {
-  ErrorStatistics ate;  // of the positions after alignment, in metres
+  ErrorStatistics ate;  // errors of the positions after alignment, in metres
   RelativeErrors rpe;
   // Scale of the best Sim(3) alignment, whichever alignment was requested: truth = scale * estimate. Empty if the
   // positions do not determine it, because one trajectory is motionless.

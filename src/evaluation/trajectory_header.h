@@ -17,9 +17,9 @@ std::string trajectory_header(std::string_view frame, PoseState state, std::stri
 // metres".
 std::string scale_comment(std::string_view scale);
 
-// What the comments at the top of a trajectory of bslam say about it.
+// The content of the comments at the top of a trajectory file of bslam.
 struct TrajectoryComments {
-  std::string frame;  // whose poses it contains: cam0, body, or the name of a camera; empty if it is not said
+  std::string frame;  // frame whose poses the file contains: cam0, body, or the name of a camera; empty if not stated
   std::string scale = "metric";  // or up-to-scale, unobservable
 };
 TrajectoryComments read_comments(const std::filesystem::path& file);

@@ -49,7 +49,7 @@ std::optional<std::int32_t> parse_id(std::string_view text) {
   return static_cast<std::int32_t>(*number);
 }
 
-// Takes the text up to the separator, and both off `rest`.
+// Returns the text up to the separator, and removes both from `rest`.
 std::string_view take(std::string_view& rest, char separator) {
   const std::size_t end = rest.find(separator);
   const std::string_view taken = rest.substr(0, end);

@@ -24,7 +24,7 @@ enum class JournalStep {
   kCalibrate,
   kFinal,    // the adjustment at the end
   kRestart,  // the map was replaced by an empty one
-  kReduce,   // the work per frame changed; input: its level of reduction
+  kReduce,   // the level of reduced work changed; input: the new level
 };
 
 JournalStep journal_step(Stage stage);

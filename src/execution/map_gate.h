@@ -22,7 +22,7 @@ class MapGate {
   void begin_frame(FrameId frame, const map::MapSnapshot& seen);
   FrameId frame() const { return frame_; }  // the last frame begun; caller's thread only
 
-  // Records a change of the work per frame. Caller's thread only.
+  // Records a change of the level of reduced work. Caller's thread only.
   void note_reduction(int level);
 
   // Commits an edit of the caller's thread.

@@ -40,15 +40,18 @@ struct ExecutionOptions {
             "maximum number of keyframes waiting for a background stage", OptionNote{.formerly = "pending_keyframes"});
     visitor(
         "await_calibration", self.await_calibration, Range{}, "",
-        "frames wait at the start until it is known whether the images agree with the calibration; not with bslam live "
-        "and --late drop; false for a System that is fed in real time");
+        "at the start, frames wait until the images have been compared with the calibration; ignored by bslam live and "
+        "with --late drop; must be false for a System that is fed in real time");
     visitor("lag_keyframe", self.lag_keyframe, Range{1, 10}, "frames",
             "lagged mode: delay from the request of a keyframe to its use");
     visitor("lag_map", self.lag_map, Range{1, 10000}, "frames",
             "lagged mode: delay from the start of mapping to the use of its result");
-    visitor("lag_loop", self.lag_loop, Range{1, 10000}, "frames", "lagged mode: the same for loop closing");
-    visitor("lag_calibrate", self.lag_calibrate, Range{1, 10000}, "frames", "lagged mode: the same for calibration");
-    visitor("lag_global", self.lag_global, Range{1, 10000}, "frames", "lagged mode: the same for global adjustment");
+    visitor("lag_loop", self.lag_loop, Range{1, 10000}, "frames",
+            "lagged mode: delay from the start of loop closing to the use of its result");
+    visitor("lag_calibrate", self.lag_calibrate, Range{1, 10000}, "frames",
+            "lagged mode: delay from the start of a calibration to the use of its result");
+    visitor("lag_global", self.lag_global, Range{1, 10000}, "frames",
+            "lagged mode: delay from the start of a global adjustment to the use of its result");
   }
 };
 

@@ -71,8 +71,9 @@ class ParallelExecutor : public StageExecutor {
  private:
   struct StageQueue {
     std::deque<StageTask> waiting;
-    std::optional<std::stop_source> running;  // of the running task, until the task that follows it is enqueued
-    StageTask running_task;                   // if one is running
+    // Stop source of the running task, until the task that follows it is enqueued.
+    std::optional<std::stop_source> running;
+    StageTask running_task;  // if one is running
   };
 
   StageQueue& queue(Stage stage) { return queues_[static_cast<std::size_t>(stage)]; }

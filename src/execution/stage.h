@@ -28,10 +28,10 @@ std::string_view stage_name(Stage stage);
 
 struct StageTask {
   Stage stage = Stage::kMap;
-  KeyframeId keyframe;  // the keyframe that caused the task; of kKeyframe: the one it has created, once committed
-  FrameId frame = {};   // of kKeyframe: the frame that caused the task
+  KeyframeId keyframe;  // the keyframe that caused the task; for kKeyframe: the keyframe it has created, once committed
+  FrameId frame = {};   // for kKeyframe: the frame that caused the task
 
-  // The id that identifies the task among those of its stage: of the frame or keyframe that caused it.
+  // Identifies the task among those of its stage: id of the frame or keyframe that caused it.
   std::int32_t input() const { return stage == Stage::kKeyframe ? frame.value() : keyframe.value(); }
   static StageTask of_input(Stage stage, std::int32_t input);
   friend bool operator==(const StageTask&, const StageTask&) = default;
@@ -60,8 +60,8 @@ struct StageFunctions {
 std::vector<StageTask> following(const StageTask& task, const StageFunctions& functions);
 
 // Number of the calibration of the rig that follows the mapping of a keyframe, counted from 0; nullopt if none does.
-// The numbers of their keyframes grow by the same factor, since a calibration costs as much as the map is large, and
-// what another one can improve decreases with the size of the map.
+// The keyframes at which calibrations run are spaced geometrically, because the cost of a calibration grows with the
+// size of the map and its benefit decreases.
 std::optional<int> calibration_due(KeyframeId keyframe);
 
 // Whether no calibration of a map that begins with keyframe 0 has been finished when this keyframe is mapped.

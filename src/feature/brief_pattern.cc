@@ -61,7 +61,7 @@ std::array<BinaryTest, kTestCount> make_brief_pattern() {
   Random random(kSeed, "binary tests");
   std::array<BinaryTest, kTestCount> tests;
   std::array<std::int64_t, kTestCount> variance;
-  std::int64_t bound_squared = 100;  // of the correlation, in thousandths
+  std::int64_t bound_squared = 100;  // squared bound of the correlation, in thousandths squared
   for (std::size_t count = 0, rejected = 0; count < tests.size();) {
     const BinaryTest test = draw_test(random);
     const std::int64_t own = model.covariance(test, test);

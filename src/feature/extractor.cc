@@ -46,7 +46,7 @@ struct Extractor::Scratch {
   FastDetector detector;
   Distribution distribution;
   Smoother smoother;
-  image::Image softened, smoothed;  // of the current level
+  image::Image softened, smoothed;  // filtered images of the current level
   std::vector<LevelCorners> levels;
   std::vector<Corner> chosen;
   std::vector<double> area;

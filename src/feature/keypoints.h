@@ -63,8 +63,8 @@ struct Keypoints {
   SharedArray<Eigen::Vector3d> bearing;
   SharedArray<float> sigma;
 
-  // Sampled at the detected pixel; in a keyframe at the refined pixel. A keyframe that is no longer new has only those
-  // that can be needed (map::BundledMap::release_unused).
+  // Patches sampled at the detected pixels; in a keyframe at the refined pixels. Old keyframes keep only the patches
+  // that can still be needed (map::BundledMap::release_unused).
   Patches patch;
 
   Keypoints() = default;
@@ -73,7 +73,7 @@ struct Keypoints {
 
   std::size_t size() const { return pixel.size(); }
   bool empty() const { return pixel.empty(); }
-  // Of the arrays that were not counted before.
+  // Memory of the arrays that were not counted before.
   KeypointMemory memory(MemoryCount& count) const;
 
   // A copy of the positions, and these keypoints with other positions (one for each keypoint).

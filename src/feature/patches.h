@@ -18,7 +18,7 @@ constexpr int kPatchSize = 10;  // 8 x 8 plus a border of one for gradients
 using Patch = std::array<std::uint8_t, kPatchSize * kPatchSize>;
 
 // Immutable; copies share the patches. The patches that are present follow each other in order of keypoint; unless all
-// are, a bit per keypoint tells which.
+// are, a bit per keypoint shows whether its patch is present.
 class Patches {
  public:
   Patches() = default;

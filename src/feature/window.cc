@@ -11,7 +11,8 @@ namespace {
 template <int kOne>
 struct Phase {
   int x, y;
-  int w00, w01, w10, w11;  // of the pixel itself, right of it, below it, and both
+  // Weights of the pixel itself, its right neighbour, its lower neighbour and its lower right neighbour.
+  int w00, w01, w10, w11;
 
   Phase(float px, float py) : x(static_cast<int>(std::floor(px))), y(static_cast<int>(std::floor(py))) {
     const int right = static_cast<int>(std::lround((px - static_cast<float>(x)) * kOne));

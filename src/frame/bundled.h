@@ -40,13 +40,13 @@ class Bundled {
 
   // The table as arrays, such as a file contains.
   struct Arrays {
-    SharedArray<KeypointRef> refs;     // of all features, in order
+    SharedArray<KeypointRef> refs;     // keypoints of all features, in order
     SharedArray<std::uint32_t> begin;  // per feature + 1, indices into refs; empty for a table without cameras
     SharedArray<FeatureId> feature;    // per keypoint, camera by camera
   };
   const Arrays& arrays() const { return arrays_; }
-  // Returns nullopt unless the arrays are such as the constructor above makes of matched features: anything that it
-  // demands of them is checked.
+  // Returns nullopt unless the arrays are valid, that is, the constructor above could have created them. All its
+  // conditions are checked.
   static std::optional<Bundled> from_arrays(std::span<const std::size_t> keypoint_counts, std::size_t num_matched,
                                             Arrays arrays, std::span<const std::optional<BundledPoint>> points);
   // The same table without the points.
@@ -71,7 +71,7 @@ class Bundled {
   }
   bool has_points() const { return !points_.empty(); }
 
-  // The memory of the tables that were not counted before.
+  // Memory of the arrays that were not counted before.
   std::size_t memory_bytes(MemoryCount& count) const;
 
  private:

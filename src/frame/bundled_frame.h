@@ -19,7 +19,7 @@ struct CameraFrame {
   image::ImageState state = image::ImageState::kMissing;
   TimeNs time_ns = 0;            // its own capture time
   feature::Keypoints keypoints;  // empty if the image is missing or damaged
-  FeatureGrid grid;              // of the keypoints' pixels
+  FeatureGrid grid;              // grid of the keypoints' pixels
   SharedArray<WordId> words;     // per keypoint, word of the vocabulary; empty until computed
 };
 
@@ -44,7 +44,7 @@ CameraFrame refined(CameraFrame camera_frame, feature::Refinement&& refinement, 
 // The frame after a change of the calibration `before` to `rig`: with the bearings of its keypoints and the capture
 // times of its images. Keypoints that their camera does not unproject keep their bearing.
 BundledFrame recalibrated(BundledFrame frame, const camera::Rig& before, const camera::Rig& rig);
-// Whether such a change changes frames.
+// Returns true if this change of the calibration changes frames.
 bool changes_frames(const camera::Rig& before, const camera::Rig& rig);
 
 // Whether projections into the frame depend on the motion of the rig: some image was captured at another time than the

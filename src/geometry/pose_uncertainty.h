@@ -1,4 +1,5 @@
-// The uncertainty of a pose T: of the left perturbation delta, rotation (rad) first, with T_true = exp(delta) T.
+// The uncertainty of a pose T: that of the left perturbation delta with T_true = exp(delta) T, rotation (rad) first,
+// then translation.
 #pragma once
 
 #include "geometry/se3.h"
@@ -10,7 +11,7 @@ struct PoseUncertainty {
 
   Matrix6d noise = Matrix6d::Zero();  // covariance of the error that the noise of the images causes
   // The error of the calibration causes delta = calibration z, where z ~ N(0, I) is the same for all poses. No columns
-  // if the calibration counts as exact.
+  // if the calibration is taken as exact.
   Effect calibration = Effect(6, 0);
 
   Matrix6d covariance() const { return noise + calibration * calibration.transpose(); }
@@ -27,7 +28,7 @@ inline PoseUncertainty operator+(const PoseUncertainty& a, const PoseUncertainty
   return {a.noise + b.noise, sum(a.calibration, b.calibration)};
 }
 
-// The uncertainty if the calibration turns out to count as exact.
+// The uncertainty if the calibration is taken as exact after all.
 inline PoseUncertainty without_calibration(const PoseUncertainty& uncertainty) { return {uncertainty.noise}; }
 
 // The uncertainty of T_b_a T_a, where T_a has this uncertainty and T_b_a is exact.

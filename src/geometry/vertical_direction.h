@@ -7,9 +7,9 @@
 
 namespace bslam::geometry {
 
-// The direction in the world that is vertical, if the rig stands or moves upright: the upward direction (-y) of the rig
-// frame, which is that of camera 0 as calibrated, unless another direction of the rig is clearly more constant over the
-// poses. A unit vector; (0, -1, 0) if there are no poses.
+// Returns the upward direction in the world frame, assuming that the rig stays upright. This is the mean direction of
+// the upward axis (-y) of the rig frame (= camera 0), or of another direction fixed to the rig if that one is clearly
+// more constant over the poses. A unit vector; (0, -1, 0) if there are no poses.
 Vector3d vertical_direction(std::span<const SE3> T_world_rig);
 
 // T_upright_world: a rotation into axes whose z points upward along vertical_direction() and whose x is the horizontal

@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::size_t kMinImages = 5;
 constexpr TimeNs kMaxPeriod = 1'000'000'000;  // slower cameras would be too far apart for one frame
-constexpr double kMinShare = 0.9;             // of the images that are within a tenth of the period of the phase
+constexpr double kMinShare = 0.9;  // minimum fraction of the images that are within a tenth of the period of the phase
 
 // Times of a camera relative to the nearest image of camera 0, of those at most 0.6 periods away.
 std::vector<TimeNs> offsets(const std::vector<TimeNs>& camera0, const std::vector<TimeNs>& times, TimeNs period_ns) {

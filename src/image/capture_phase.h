@@ -10,9 +10,10 @@
 namespace bslam::image {
 
 struct CapturePhase {
-  // Whether at least 90 % of the images are within a tenth of the period of camera 0 of one time.
+  // Whether the delay is constant: at least 90 % of the images are within a tenth of the period of camera 0 of one
+  // delay.
   bool constant = false;
-  // How much later than camera 0 the camera captures, between minus and plus half a period; 0 if it is not constant.
+  // Delay of the camera relative to camera 0, between minus and plus half a period; 0 if it is not constant.
   TimeNs later_ns = 0;
 
   bool operator==(const CapturePhase&) const = default;
@@ -31,7 +32,7 @@ TimeNs wrapped(TimeNs time_ns, TimeNs period_ns);
 // How images are grouped into frames by image/frame_grouping.h: those of each camera as if they had been captured
 // `later_ns` earlier, with this tolerance.
 struct CapturePhases {
-  // Of camera 0 the default. The delay is 0 for cameras that differ from camera 0 by at most the tolerance.
+  // The default value for camera 0. The delay is 0 for cameras that differ from camera 0 by at most the tolerance.
   std::vector<CapturePhase> cameras;
   TimeNs tolerance_ns = 0;  // at least a tenth of the period of camera 0 if the phase of any other camera is constant
 

@@ -37,7 +37,7 @@ struct ImageBundle {
   TimeNs time_ns = 0;
   std::vector<CameraImage> images;  // one per camera of the rig
 
-  // Of the pixels that it owns.
+  // Memory of the pixels that it owns.
   std::size_t memory_bytes() const {
     std::size_t bytes = 0;
     for (const CameraImage& i : images) bytes += i.image.memory_bytes() + i.mask.memory_bytes();

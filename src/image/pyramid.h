@@ -16,7 +16,8 @@ struct Pyramid {
   std::vector<Image> levels;
   std::vector<double> scale_x, scale_y;  // pixels of level 0 per pixel of the level (exact: width_0 / width_l)
 
-  std::vector<std::shared_ptr<const Resampling>> resampling;  // of each level to the next, for images of these sizes
+  // Weights from each level to the next, for images of these sizes.
+  std::vector<std::shared_ptr<const Resampling>> resampling;
 
   std::size_t size() const { return levels.size(); }
   double to_base_x(std::size_t level, double x) const { return (x + 0.5) * scale_x[level] - 0.5; }

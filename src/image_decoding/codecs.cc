@@ -24,10 +24,10 @@ void read_png(png_structp png, png_bytep to, std::size_t count) {
   rest.remove_prefix(count);
 }
 
-// Leaves libpng's function that met the error.
+// Leaves the libpng function in which the error occurred.
 void leave(png_structp png, png_const_charp) { std::longjmp(*static_cast<std::jmp_buf*>(png_get_error_ptr(png)), 1); }
 
-// A decoder and what it needs while it runs; released also after an error.
+// A decoder and its buffers, which are also released after an error.
 struct PngReader {
   explicit PngReader(std::string_view bytes)
       : rest(bytes), png(png_create_read_struct(PNG_LIBPNG_VER_STRING, &on_error, leave, [](png_structp, auto) {})) {

@@ -63,7 +63,7 @@ cv::Mat colours_of_file(std::string_view bytes) {
   return bytes.starts_with("\xff\xd8") ? colours_of_jpeg(bytes) : cv::Mat();
 }
 
-// Pixels that read_image has accepted before.
+// Converts pixels to RGB. The image must have been checked by read_image.
 cv::Mat colours_of_pixels(const image_files::StoredImage& stored) {
   using enum image_files::PixelLayout;
   const auto code = stored.layout == kRgb    ? -1
@@ -79,7 +79,8 @@ cv::Mat colours_of_pixels(const image_files::StoredImage& stored) {
   return out;
 }
 
-// The colours of an image in a recording; empty if it has none, or is read as grey values.
+// Returns the RGB image of an image in a recording; empty if the image has no colours or a layout that is read as grey
+// values only.
 cv::Mat colours_of_stored(const image_files::StoredImage& stored) {
   using enum image_files::PixelLayout;
   const std::string_view bytes = std::string_view(stored.bytes).substr(stored.begin, stored.size);
@@ -92,7 +93,7 @@ cv::Mat colours_of_stored(const image_files::StoredImage& stored) {
 }  // namespace
 
 Result<cv::Mat> read_colours(const image_files::ImageFile& image, const PixelFormat& format) {
-  const auto grey = read_image(image, format);  // which also checks that the image is complete
+  const auto grey = read_image(image, format);  // read_image also checks that the image is complete
   if (!grey) return grey.error();
   cv::Mat colours;
   if (image.store) {

@@ -8,8 +8,8 @@ enum class Bayer { kNone, kRggb, kBggr, kGrbg, kGbrg };
 
 // The same for all images of a camera, so that brightness does not change between them.
 struct PixelFormat {
-  int bits = 16;               // of 16-bit files: 2^bits - 1 is white; larger values are limited to it
-  Bayer bayer = Bayer::kNone;  // of files with one channel
+  int bits = 16;               // bits in use in 16-bit files: 2^bits - 1 is white; larger values are clamped to it
+  Bayer bayer = Bayer::kNone;  // colour filter of files with one channel
 };
 
 }  // namespace bslam::image_decoding

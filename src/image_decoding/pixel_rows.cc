@@ -63,7 +63,7 @@ std::uint16_t value_at(const std::uint8_t* row, int index, bool big_endian) {
   return static_cast<std::uint16_t>(row[low] | row[high] << 8);
 }
 
-// The brightness of a row of values of two bytes, of the colours in equal parts as of the bytes.
+// The brightness of a row of two-byte values, with the same weights of the colours as for one-byte values.
 void grey_of_words(const StoredImage& image, int y, int bits, std::uint8_t* out) {
   const int channels = channels_of(image.layout), shift = bits - 8;
   const std::uint8_t* row = row_of(image, y);

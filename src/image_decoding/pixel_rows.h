@@ -10,9 +10,9 @@
 
 namespace bslam::image_decoding {
 
-// Returns the brightness of every pixel, of a colour filter as it is stored: the upper eight of `bits` bits of values
-// of two bytes. Returns nullopt if the size is impossible or the rows do not fit into the bytes. The layout is not
-// kFile.
+// Returns the brightness of every pixel as 8 bits, the upper eight of `bits` bits for values of two bytes. Images with
+// a colour filter are returned as stored. Returns nullopt if the size is impossible or the rows do not fit into the
+// bytes. The layout is not kFile.
 std::optional<image::Image> grey_of_rows(const image_files::StoredImage& image, int bits);
 
 // Returns the largest value of an image with values of two bytes; 0 if the rows do not fit into the bytes.

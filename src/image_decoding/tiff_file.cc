@@ -16,8 +16,9 @@
 namespace bslam::image_decoding {
 namespace {
 
-constexpr std::size_t kMostBytes = std::size_t{1} << 29;  // of an image
-constexpr std::size_t kMostRatio = 3000;  // of any of the compressions; a header that says more is damaged
+constexpr std::size_t kMostBytes = std::size_t{1} << 29;  // maximum size of an image
+// Maximum compression ratio of all supported compressions; a header that requires more is damaged.
+constexpr std::size_t kMostRatio = 3000;
 constexpr std::uint32_t kNone = 1, kLzw = 5, kDeflate = 8, kPackBits = 32773, kOldDeflate = 32946;
 
 // Reads numbers in the byte order of the file. Outside of the file they are 0.

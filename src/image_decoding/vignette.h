@@ -21,8 +21,9 @@ class Vignette {
   static Result<Vignette> read(const std::filesystem::path& file, const camera::Camera& camera);
 
   bool empty() const { return gain_.empty(); }
-  // Makes all pixels as bright as in the brightest place of the vignette, by a factor of at most 8; values above 255
-  // become 255. The image must have the resolution of the camera, and values proportional to the brightness.
+  // Corrects the vignetting: scales every pixel to the brightness at the brightest place of the vignette, by a factor
+  // of at most 8. Values above 255 become 255. The image must have the resolution of the camera, and values
+  // proportional to the brightness.
   void correct(image::Image& image) const;
 
  private:

@@ -42,7 +42,7 @@ std::size_t remove_damaged_zeros(std::vector<ImageFile>& images) {
   return zeros;
 }
 
-// Says how often time stamps step back, and where first; empty if they do not.
+// Returns a text with the number of backward steps of time stamps and the first of them; empty if there are none.
 std::string steps_back_text(const std::vector<ImageFile>& images, StampUnit unit) {
   std::size_t steps = 0, first = 0;
   for (std::size_t k = 1; k < images.size(); ++k) {

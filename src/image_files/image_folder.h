@@ -14,20 +14,21 @@
 
 namespace bslam::image_files {
 
-// Where an image is: a file of its own, or a place in a recording.
+// The location of an image: a separate file, or an entry of a recording.
 struct ImageFile {
   std::filesystem::path path;       // empty if the image is in a store
   TimeNs time_ns = 0;               // time of capture, with the time offset of the camera applied
   std::filesystem::path mask = {};  // file of a mask of this image alone; empty: none
   std::shared_ptr<const ImageStore> store = {};
   std::int64_t entry = 0;  // number of the image in the store
-  // Images of different cameras with the same number were one frame when they were recorded; nullopt: unknown.
+  // Time of the frame in which the image was recorded; images of different cameras with the same number form one frame.
+  // nullopt: unknown.
   std::optional<TimeNs> frame_ns = {};
 };
 
-// For messages: the file of an image, or its place in a recording.
+// Text for messages: the file of an image, or its location in a recording.
 std::string name_of(const ImageFile& image);
-// For messages: the folder or the topic of an image.
+// Text for messages: the folder or the topic of an image.
 std::string source_of(const ImageFile& image);
 
 // Images of one camera with their recorded time stamps, strictly increasing.

@@ -20,7 +20,7 @@ struct StoredImage {
   int width = 0, height = 0;  // pixels; 0 for kFile
   std::size_t step = 0;       // bytes from one row to the next
   int bytes_per_value = 1;    // 1 or 2
-  bool big_endian = false;    // of values of two bytes
+  bool big_endian = false;    // byte order of values of two bytes
 };
 
 // Reads images by their number in a recording. May be called from several threads at the same time.
@@ -30,9 +30,9 @@ class ImageStore {
 
   // Errors, which name the file and the image: it is damaged, or its pixels have an unknown layout.
   virtual Result<StoredImage> read(std::int64_t entry) const = 0;
-  // For messages: file, topic and number of the image.
+  // Text for messages: file, topic and number of the image.
   virtual std::string name(std::int64_t entry) const = 0;
-  // For messages: file and topic.
+  // Text for messages: file and topic.
   virtual std::string source(std::int64_t entry) const = 0;
   // The topic alone, or the video.
   virtual std::string stream(std::int64_t entry) const = 0;

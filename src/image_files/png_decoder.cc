@@ -41,7 +41,8 @@ bool checksum_holds(const Chunk& chunk) {
   return libdeflate_crc32(0, chunk.type.data(), chunk.type.size() + chunk.data.size()) == chunk.checksum;
 }
 
-constexpr std::uint32_t kMaxSidePx = 20000;  // as of a camera; bounds the memory that a damaged header can request
+// The same limit as for cameras; bounds the memory that a damaged header can request.
+constexpr std::uint32_t kMaxSidePx = 20000;
 
 struct Header {
   int width = 0, height = 0;

@@ -13,7 +13,7 @@ using tracking::ObservedKeypoints;
 
 constexpr int kMaxImageWidth = 480;
 
-// What a keypoint is, in order of precedence.
+// The state of a keypoint; if several apply, the first one is used.
 enum class KeypointKind : unsigned char { kUnmatched, kOutlier, kTracked };
 
 ordered_json keypoint_arrays(const ObservedKeypoints& keypoints) {

@@ -8,8 +8,8 @@
 
 namespace bslam::live_view {
 
-// `time_s`: of the frame, since the first image of the data set. The pose is that in the frame's map at present.
-// web/src/live_data.ts describes the structure.
+// `time_s`: time of the frame in seconds since the first image of the data set. The pose is relative to the map as it
+// is now. web/src/live_data.ts describes the structure.
 nlohmann::ordered_json frame_json(const session::ProcessedFrame& frame, double time_s);
 
 }  // namespace bslam::live_view

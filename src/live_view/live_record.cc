@@ -46,7 +46,7 @@ void LiveRecord::add(FedFrame&& fed) {
   frame.record = std::move(fed.record);
 }
 
-// The poses of a wrong initialisation are withdrawn with its map.
+// Removes the poses of a wrong initialisation together with its map.
 void LiveRecord::withdraw_map() {
   for (session::RunFrame& frame : record_.frames) {
     if (frame.outcome() != session::FrameOutcome::kTracked) continue;

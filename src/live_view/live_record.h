@@ -1,4 +1,4 @@
-// What the live view knows of a run: a record like that at the end, which grows frame by frame.
+// The data of the live view: a record like the final record of a run, which grows frame by frame.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -12,7 +12,7 @@
 
 namespace bslam::live_view {
 
-// A frame as it was fed.
+// An input frame of the run.
 struct FedFrame {
   TimeNs time_ns = 0;
   std::optional<tracking::FrameRecord> record;  // nullopt if it was dropped
@@ -35,8 +35,8 @@ class LiveRecord {
 
   void add(FedFrame&& frame);
 
-  // The data of the page (session/report_data.h) for the map of this time. Its time is proportional to the number of
-  // frames; poses, frames and landmarks are thinned out to a few thousand.
+  // Returns the data of the page (session/report_data.h) for the current map. The cost is proportional to the number of
+  // frames. Poses, frames and landmarks are subsampled to a few thousand.
   nlohmann::ordered_json run_json(const map::BundledMap& map, const camera::Rig& rig, const StageResults& results,
                                   const std::optional<geometry::UpAxis>& up);
 

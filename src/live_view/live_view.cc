@@ -38,10 +38,10 @@ std::string text_of(const ordered_json& json) {
   return json.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
 }
 
-// What the run hands over to the view.
+// The data that the run passes to the view.
 struct Mailbox {
-  std::vector<FedFrame> frames;                         // since the view has looked; none is left out
-  std::shared_ptr<const session::ProcessedFrame> last;  // the newest that was processed
+  std::vector<FedFrame> frames;                         // all frames since the view last read them
+  std::shared_ptr<const session::ProcessedFrame> last;  // the newest processed frame
   std::optional<StageResults> results;
   Phase phase = Phase::kFeeding;
   std::size_t fed = 0;  // frames
@@ -122,7 +122,7 @@ class LiveView::Content final : public web_server::Content {
     return text_of({{"channel", channel}, {"value", std::move(value)}});
   }
 
-  // Takes what has come since the last call. The lock is held for the exchange of pointers only.
+  // Takes what has come since the last call. The lock is only held while pointers are exchanged.
   void collect() {
     std::vector<FedFrame> frames;
     std::optional<StageResults> results;

@@ -1,5 +1,5 @@
-// Returns to a place that tracking and fusion have joined with the new keyframes before place recognition has reported
-// them: its landmarks are already observed, so that it is a neighbour and not a candidate any more.
+// Finds returns to a place that place recognition cannot report: tracking and fusion have already matched the landmarks
+// of the place, so that its keyframes are covisible neighbours and therefore no candidates.
 #pragma once
 
 #include <optional>
@@ -13,11 +13,11 @@ namespace bslam::looping {
 class JoinedReturns {
  public:
   // The earlier keyframe to whose place the rig has returned after it had lost sight of that place, if it is a
-  // neighbour of `keyframe` (neighbours_of). Nothing is returned while a return that was closed goes on. Keyframes must
-  // come in order of their ids.
+  // neighbour of `keyframe` (neighbours_of). Returns nothing while a return that has been closed continues. Keyframes
+  // must come in order of their ids.
   std::optional<KeyframeId> find(const map::BundledMap& map, KeyframeId keyframe, const LoopingOptions& options);
 
-  // The return at `keyframe` has been closed.
+  // Records that the return at `keyframe` has been closed.
   void closed(KeyframeId keyframe) { last_ = keyframe; }
 
  private:

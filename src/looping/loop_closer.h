@@ -23,12 +23,12 @@ struct LoopClosure {
   bool merged = false;                // two submaps were merged
 };
 
-// How far keyframes have come in being recognised in other submaps, from the first stage to the last one.
+// The stages of recognising a keyframe in another submap, in their order.
 enum class JoinStage { kNoCandidate, kNotConsistent, kNotVerified, kAmbiguous };
 
 struct JoinAttempts {
-  JoinStage farthest = JoinStage::kNoCandidate;  // of all keyframes that were not joined
-  int most_inliers = 0;                          // of the candidates that were not verified
+  JoinStage farthest = JoinStage::kNoCandidate;  // the last stage reached by any keyframe that was not joined
+  int most_inliers = 0;                          // largest number of inliers of a candidate that was not verified
 };
 
 // The loop-closing stage: its options, its place recogniser, and the recognition history between keyframes.
@@ -38,16 +38,16 @@ class LoopCloser {
              const feature::FeatureModel& features, std::uint64_t seed);
 
   // If `keyframe` (alive) closes a loop, writes the correction to the draft; otherwise leaves the draft unchanged.
-  // Keyframes must come in order of their ids. `attempts` is updated with what became of candidates in other submaps.
+  // Keyframes must come in order of their ids. `attempts` is updated with the results for candidates in other submaps.
   std::optional<LoopClosure> close(KeyframeId keyframe, map::MapDraft& draft, JoinAttempts* attempts = nullptr);
 
-  // The next keyframe does not continue the path of the previous ones.
+  // Declares that the next keyframe does not continue the path of the previous ones.
   void begin_path() {
     history_ = {};
     joined_ = {};
   }
 
-  // Of the index of its place recogniser.
+  // Memory of the index of its place recogniser, in bytes.
   std::size_t memory_bytes() const { return recogniser_->memory_bytes(); }
 
  private:

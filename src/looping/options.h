@@ -90,7 +90,7 @@ struct LoopOptions {
   // Maximum translation of the correction, relative to the path length since the place was last seen plus the median
   // depth of the scene; a larger one is a false match, not drift.
   double max_drift = 0.05;
-  double max_drift_free = 0.3;  // the same in maps whose scale is not metric
+  double max_drift_free = 0.3;  // the same maximum in maps whose scale is not metric
   // In metric maps, loops with a smaller reprojection error are corrected without a pose graph.
   double max_bundle_error_px = 4.0;
   int edge_weight = 60;  // minimum number of shared landmarks for a covisibility edge of the pose graph
@@ -113,7 +113,7 @@ struct LoopOptions {
             OptionNote{.formerly = "max_apart"});
     visitor("max_drift", self.max_drift, Range{0, 10}, "",
             "maximum correction relative to the path length since the place was last seen, plus the scene depth");
-    visitor("max_drift_free", self.max_drift_free, Range{0, 10}, "", "the same in maps whose scale is not metric");
+    visitor("max_drift_free", self.max_drift_free, Range{0, 10}, "", "max_drift in maps whose scale is not metric");
     visitor("max_bundle_error_px", self.max_bundle_error_px, Range{0, 1000}, "px",
             "reprojection error up to which a loop of a metric map is corrected without a pose graph",
             OptionNote{.formerly = "near_px"});

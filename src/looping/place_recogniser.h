@@ -36,7 +36,7 @@ class PlaceRecogniser {
   // Returns keyframes of `map` that may show the place of a frame prepared by describe().
   virtual std::vector<Candidate> query_frame(const map::BundledMap& map, const frame::BundledFrame& frame) = 0;
 
-  // Of its index.
+  // Memory of its index, in bytes.
   virtual std::size_t memory_bytes() const { return 0; }
 };
 

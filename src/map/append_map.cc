@@ -57,7 +57,8 @@ class CameraChange {
   }
 
   std::shared_ptr<const camera::Rig> before_, after_;  // both with the cameras of the other map
-  std::vector<CameraIndex> camera_;                    // of the map to which it is appended, for each of the other map
+  // For each camera of the appended map: its index in the map to which it is appended.
+  std::vector<CameraIndex> camera_;
   std::size_t num_cameras_ = 0;
 };
 

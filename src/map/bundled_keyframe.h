@@ -28,14 +28,14 @@ struct BundledKeyframe {
   KeyframeId parent;                                 // spanning tree; invalid for the root
   std::vector<KeyframeId> children;                  // in order of id
   geometry::SE3 T_rig_parent;                        // once removed: its pose relative to `parent`
-  // Velocity of the rig during the capture, as BundledFrame::twist, in the unit of the map.
+  // Velocity of the rig during the capture, as BundledFrame::twist; lengths in map units.
   geometry::Vector6d twist = geometry::Vector6d::Zero();
-  // Of T_rig_world relative to the root of its submap (adjustment/pose_uncertainty.h), in radians and map units. Zero
-  // for the root and in a loaded map.
+  // Uncertainty of T_rig_world relative to the root of its submap (adjustment/pose_uncertainty.h), in radians and map
+  // units. Zero for the root and in a loaded map.
   geometry::PoseUncertainty uncertainty = {};
   bool alive = false;
-  // Product of all factors by which lengths about this keyframe have changed since it was added. A length that was
-  // stored when this was s is now scale / s times as long.
+  // Product of all factors by which lengths near this keyframe have been scaled since it was added. A length stored
+  // when this value was s must be multiplied by scale / s.
   double scale = 1.0;
 };
 

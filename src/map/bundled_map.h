@@ -38,29 +38,30 @@ std::string_view scale_name(Scale scale);  // "metric", "up-to-scale", "unobserv
 struct MapMemory {
   std::size_t keyframes = 0;    // poses, spanning tree, and the tables of their landmarks
   std::size_t features = 0;     // positions and tables of their features
-  std::size_t descriptors = 0;  // of their features
+  std::size_t descriptors = 0;  // descriptors of their features
   std::size_t patches = 0;      // small images of their features
-  std::size_t words = 0;        // of the vocabulary, of their features
+  std::size_t words = 0;        // visual words of their features
   std::size_t landmarks = 0, observations = 0, covisibility = 0;
   std::size_t total() const {
     return keyframes + features + descriptors + patches + words + landmarks + observations + covisibility;
   }
 };
 
-// The content of a saved map. Numbers are not checked yet, but that the spans of a landmark or of an observation have
-// equal lengths, and that the counts add up to their number.
+// The content of a saved map. The reader has only checked that the spans with one entry per landmark have equal
+// lengths, those with one entry per observation as well, and that the sum of the counts is the number of observations.
+// No other value is checked yet.
 struct MapParts {
-  std::span<const std::shared_ptr<const frame::BundledFrame>> frames;  // of keyframes 0, 1, ...
+  std::span<const std::shared_ptr<const frame::BundledFrame>> frames;  // frames of keyframes 0, 1, ...
   std::span<const geometry::SE3> T_rig_world;
   std::span<const KeyframeId> parents;            // within range, invalid for roots
   std::span<const std::uint32_t> counts;          // observations of each landmark
-  std::function<Landmark(std::size_t)> landmark;  // of each index of `counts`
-  std::span<const KeyframeId> observing;          // of all observations, landmark by landmark
+  std::function<Landmark(std::size_t)> landmark;  // returns the landmark at an index of `counts`
+  std::span<const KeyframeId> observing;          // keyframes of all observations, landmark by landmark
   std::span<const FeatureId> features;
   std::span<const std::uint8_t> aligned;  // 0 or 1
 };
 struct PartsError {
-  std::optional<std::size_t> landmark;  // to which it belongs
+  std::optional<std::size_t> landmark;  // the landmark to which the problem belongs
   std::string found, expected;
 };
 
@@ -74,8 +75,8 @@ class BundledMap {
   std::shared_ptr<const camera::Rig> shared_rig() const { return rig_; }
   // The same cameras with the calibration that runs were given, before any of them refined it.
   const camera::Rig& given_rig() const { return *given_rig_; }
-  // Of the calibration: L with the covariance L L^T of the extrinsics of cameras 1 to N-1 and the intrinsics of all
-  // cameras (calibration::RigInformation). Null if the calibration counts as exact.
+  // Square root L of the covariance L L^T of the calibration: the extrinsics of cameras 1 to N-1 and the intrinsics of
+  // all cameras (calibration::RigInformation). Null if the calibration is taken as exact.
   const std::shared_ptr<const Eigen::MatrixXd>& rig_deviation() const { return rig_deviation_; }
   // The pyramid on which keypoints were detected.
   const feature::PyramidShape& pyramid() const { return pyramid_; }
@@ -140,7 +141,7 @@ class BundledMap {
   // The keypoints of one camera of a keyframe.
   const feature::Keypoints& keypoints(KeyframeId k, CameraIndex c) const { return keyframe(k).frame->keypoints(c); }
 
-  // In map_memory.cc: the memory of all that was not counted before.
+  // In map_memory.cc: memory of all parts that were not counted before.
   MapMemory memory(MemoryCount& count) const;
 
   // Returns a description of the first violated invariant, or nullopt. The invariants: observations and the landmark
@@ -206,8 +207,9 @@ class BundledMap {
   // Scales a submap around the origin by `factor`, including the relative poses of its removed keyframes, and begins a
   // gauge epoch. Returns false if `root` is not the root of a submap.
   bool scale_submap(KeyframeId root, double factor);
-  // Records that lengths about keyframes have changed by these factors: what is stored relative to one of them (frames,
-  // removed keyframes, its twist), and its uncertainty, follow. Poses and positions in the world are set separately.
+  // Records that lengths near keyframes have changed by these factors. Everything that is stored relative to one of
+  // these keyframes (frames, removed keyframes, its twist) and its uncertainty are rescaled. Poses and positions in the
+  // world are set separately.
   void scale_keyframes(std::span<const std::pair<KeyframeId, double>> factors);
   bool set_pose(KeyframeId k, const geometry::SE3& T_rig_world);
   bool set_twist(KeyframeId k, const geometry::Vector6d& twist);
@@ -221,22 +223,22 @@ class BundledMap {
   // Releases the memory of removed landmarks. Each call visits the next `slots` landmarks in turn, and releases a block
   // of landmarks if none of them is alive.
   void free_removed(std::size_t slots);
-  // Releases what keyframes need only while they are new. Each call visits at most `count` keyframes that it has not
-  // visited yet, and leaves the newest kNewKeyframes alone. The others keep the patches of the references of landmarks,
-  // and those that become the references when other observations are removed: of the first keypoints of features with a
-  // landmark. They lose the points of their features, which became landmarks when the keyframe was new, and cells
-  // of the grids, which a search fills again.
+  // Releases data that keyframes need only while they are new. Each call visits at most `count` keyframes that have not
+  // been visited yet; the newest kNewKeyframes are skipped. A visited keyframe keeps the patches that are or can become
+  // references of landmarks: those of the first keypoints of features with a landmark. It releases the triangulated
+  // points of its features, from which landmarks were created when it was new, and the cells of its grids, which the
+  // next search fills again.
   void release_unused(std::size_t count);
   static constexpr std::size_t kNewKeyframes = 64;
 
-  // Tells the system that what was read of the map's file is not needed soon, after all keyframes were visited. Does
-  // nothing if the arrays of no keyframe lie in a file.
+  // Tells the operating system that the pages of the map's file are not needed soon, after all keyframes were visited.
+  // Does nothing if no keyframe has arrays in a mapped file.
   void release_pages() const;
   void set_file(std::shared_ptr<const MappedFile> file) { file_ = std::move(file); }
 
-  // ---- In fill_map.cc
-  // Fills an empty map. The viewing direction, distances and descriptor of the landmarks are taken as they are. Returns
-  // what is wrong with the parts, if anything is; the map is unusable then. Otherwise it has all invariants.
+  // ---- In fill_map.cc Fills an empty map. The viewing direction, distances and descriptor of the landmarks are taken
+  // as they are. Returns a description of the first problem in the parts, after which the map must not be used, or
+  // nullopt; then all invariants hold.
   std::optional<PartsError> fill(const MapParts& parts, ThreadPool& pool);
 
  private:

@@ -1,5 +1,5 @@
-// BundledMap::fill: makes a map of the parts of a file. What belongs together is checked and computed for all landmarks
-// at once, which is many times faster than adding one after the other.
+// BundledMap::fill creates a map from the parts of a file. Links are checked and computed for all landmarks together,
+// which is many times faster than adding landmarks one after the other.
 #include <algorithm>
 #include <numeric>
 #include <utility>
@@ -29,7 +29,7 @@ std::vector<Covisible> neighbours_of(const BundledMap& map, KeyframeId k, std::s
   return out;
 }
 
-// Returns what is wrong with an observation of a landmark, found and expected.
+// Returns the problem of an observation of a landmark as `found` and `expected`.
 std::optional<std::pair<const char*, const char*>> wrong(const MapParts& parts, std::size_t i, std::size_t first,
                                                          const std::vector<std::vector<LandmarkId>>& tables) {
   using Wrong = std::pair<const char*, const char*>;

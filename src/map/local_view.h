@@ -17,7 +17,8 @@ struct LocalViewOptions {
   static void visit(Self& self, Visitor& visitor) {
     visitor("max_keyframes", self.max_keyframes, Range{1, 1000}, "",
             "maximum number of keyframes whose landmarks are searched for");
-    visitor("neighbours", self.neighbours, Range{0, 100}, "", "covisible keyframes added for each of them");
+    visitor("neighbours", self.neighbours, Range{0, 100}, "",
+            "covisible keyframes added for each keyframe that shares landmarks with the frame");
   }
 };
 

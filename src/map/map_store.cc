@@ -20,7 +20,7 @@ void MapStore::restart() {
   BundledMap emptied = *snapshot();
   for (const KeyframeId root : emptied.roots()) emptied.remove_submap(root);
   emptied.free_removed(emptied.landmark_slots());
-  emptied.set_scale(Scale::kMetric);  // as of a new map
+  emptied.set_scale(Scale::kMetric);  // the initial value of a new map
   emptied.set_version(emptied.version().next());
   auto fresh = std::make_shared<const BundledMap>(std::move(emptied));
   const std::lock_guard lock(mutex_);

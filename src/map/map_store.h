@@ -13,7 +13,8 @@ namespace bslam::map {
 struct CommitReport : RebaseReport {
   MapSnapshot published;
   bool rebased = false;  // other edits had been committed since the base
-  // the edit was a correction with another correction committed since its base; nothing was applied or published
+  // The edit corrects poses, and another correction has been committed since its base. Nothing was applied or
+  // published.
   bool rejected = false;
 };
 

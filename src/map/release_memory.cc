@@ -1,4 +1,4 @@
-// Releases the memory of what a map does not need any more.
+// Releases memory that a map no longer needs.
 #include <algorithm>
 
 #include "base/mapped_file.h"

@@ -32,8 +32,8 @@ bool same_pose(const geometry::SE3& a, const geometry::SE3& b) {
   return geometry::so3_log(D.rotation()).norm() <= kMaxAngle && D.translation().norm() <= kMaxShift;
 }
 
-// Whether the name was that of other cameras of the rig when they were given, but not that of this one. Two cameras may
-// have the same calibration, so that only their names tell them apart.
+// Returns true if the name is the original name of other cameras of the rig, but not of this one. Two cameras may have
+// the same calibration, so that only their names distinguish them.
 bool names_another(const camera::Rig& given, std::size_t camera, const std::string& name) {
   if (given.camera(camera).name == name) return false;
   for (std::size_t i = 0; i < given.size(); ++i) {

@@ -16,8 +16,8 @@ namespace bslam::map {
 // they had before a run refined it, and the name of no other camera of the map.
 std::optional<std::size_t> find_rig(const BundledMap& map, const camera::Rig& rig);
 
-// As find_rig, but appends the cameras if the map does not have them. A name that is taken becomes camN, the number of
-// the camera in the map.
+// As find_rig, but appends the cameras if the map does not have them. A camera whose name is already used is renamed to
+// camN, with its index N in the map.
 std::size_t find_or_append_rig(BundledMap& map, const camera::Rig& rig);
 
 // Finds or appends all rigs of `other`, with their calibrations as given and as refined, and returns for each camera of

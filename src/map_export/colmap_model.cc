@@ -11,7 +11,8 @@ namespace {
 using camera::Camera;
 using geometry::SE3;
 
-constexpr double kMaxRigidShift_px = 0.05;  // a motion between the images of a frame that no result depends on
+// Pixels; smaller motions between the images of a frame have no influence on the result.
+constexpr double kMaxRigidShift_px = 0.05;
 
 // Returns the name of a camera model in COLMAP, or an empty string if COLMAP does not have it.
 std::string_view colmap_name(const camera::CameraModel& model) {
@@ -171,7 +172,7 @@ class Writer {
   std::size_t points_ = 0;
 };
 
-// What the model says differently from the map.
+// Notes on differences between the model and the map.
 std::vector<std::string> notes_of(const Selection& selection, const ImageTable& images, double shift_px) {
   std::vector<std::string> notes;
   const camera::Rig& rig = selection.map->rig();

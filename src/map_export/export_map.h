@@ -40,7 +40,7 @@ struct ExportRequest {
   std::optional<geometry::UpAxis> up;      // kNerfstudio, kOctomap, kNav2: default: upward_note()
 };
 
-// What a user should know about the vertical direction if `up` is not given.
+// A note for the user about the vertical direction that is used if `up` is not given.
 std::string upward_note();
 
 struct ExportReport {

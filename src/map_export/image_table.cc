@@ -12,10 +12,10 @@ namespace {
 
 struct RecordedImage {
   const image_files::ImageFile* image;
-  std::size_t camera;  // of the recording
+  std::size_t camera;  // index in the recording
 };
 
-// Names come from files of others.
+// Names come from files that may contain anything.
 std::string without_control_characters(std::string name) {
   std::ranges::replace_if(
       name, [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '_');

@@ -1,4 +1,4 @@
-// How well keypoints determine the positions of landmarks.
+// Information and covariance of landmark positions.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,4 +1,4 @@
-// What the exports to all formats share. Internal to this folder.
+// Common base of the exports to all formats. Internal to this folder.
 #pragma once
 
 #include "base/atomic_folder.h"

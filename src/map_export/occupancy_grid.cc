@@ -10,7 +10,7 @@
 namespace bslam::map_export {
 namespace {
 
-constexpr double kMaxCells = 2e7;  // which take 340 MB
+constexpr double kMaxCells = 2e7;  // a grid of this size takes 340 MB
 
 // A part of a line of sight in the plane.
 struct Segment {

@@ -8,7 +8,7 @@
 namespace bslam::map_export {
 namespace {
 
-constexpr double kMaxTangent = 1.428;  // of half the field of view: 55 degrees
+constexpr double kMaxTangent = 1.428;  // tangent of half the maximum field of view: 55 degrees
 
 // Returns the smallest |x / z| (axis 0) or |y / z| (axis 1) of the rays of one side of the image, limited to
 // kMaxTangent. Pixels without a ray, or with one far from the optical axis, do not limit it.
@@ -56,7 +56,7 @@ camera::Camera pinhole_for(const camera::Camera& camera) {
   const double right = camera.width - 1, bottom = camera.height - 1;
   const double x = std::min(tangent_at_side(camera, 0, 0), tangent_at_side(camera, 0, right));
   const double y = std::min(tangent_at_side(camera, 1, 0), tangent_at_side(camera, 1, bottom));
-  constexpr double kLeast = 1e-3;  // of a camera whose rays are all on one side
+  constexpr double kLeast = 1e-3;  // minimum tangent, for a camera whose rays are all on one side
   const double f = std::max(0.5 * right / std::max(x, kLeast), 0.5 * bottom / std::max(y, kLeast));
   camera::Camera pinhole = camera;
   pinhole.model = camera::Pinhole({f, f, 0.5 * right, 0.5 * bottom});

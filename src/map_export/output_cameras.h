@@ -19,7 +19,7 @@ class OutputCameras {
 
   bool undistorted() const { return undistort_; }
   const camera::Camera& camera(std::size_t c) const { return cameras_[c]; }
-  // Where a pixel of a recorded image is in the exported image; nullopt if it is outside.
+  // Position in the exported image of a pixel of the recorded image; nullopt if it is outside.
   std::optional<Eigen::Vector2d> pixel(std::size_t c, const Eigen::Vector2f& recorded) const;
   // The exported image of a recorded one, which must have the size of its camera.
   cv::Mat image(std::size_t c, const cv::Mat& recorded);

@@ -1,4 +1,4 @@
-// What of a map is exported: one submap, since submaps have world frames that are not related to each other.
+// The part of a map that is exported: one submap, because the world frames of submaps are not related to each other.
 #pragma once
 
 #include <cstddef>

@@ -13,13 +13,13 @@ namespace bslam::map_service {
 // The result of a frame. It contains no times, so that it depends on the images only.
 std::string localisation_json(const tracking::FrameRecord& record, const camera::Rig& rig);
 
-// What the map is.
+// Metadata of the map.
 struct MapSource {
   std::string name;     // without a folder
   std::string data;     // name of the recording
   std::string made_by;  // version of the program
   std::string id;       // equal if and only if the files are
-  std::string warning;  // why its poses cannot be relied on; empty: nothing is known
+  std::string warning;  // reason why its poses cannot be relied on; empty: none known
 };
 
 // `rig`: the cameras that requests may have.

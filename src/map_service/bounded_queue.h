@@ -1,4 +1,4 @@
-// A queue between threads that refuses what it has no room for.
+// A queue between threads that rejects elements when it is full.
 #pragma once
 
 #include <condition_variable>
@@ -34,7 +34,7 @@ class BoundedQueue {
     return element;
   }
 
-  // Nothing is added any more.
+  // Closes the queue: no further elements are added.
   void close() {
     const std::lock_guard lock(mutex_);
     closed_ = true;

@@ -16,8 +16,8 @@ struct ServiceOptions {
   web_server::ServerOptions server;
   int workers = 1;         // threads that localise
   std::size_t queue = 16;  // requests that may wait for a worker; further ones are answered with 503
-  std::uint64_t max_request_bytes = 32u << 20;  // of one body
-  std::string token = {};                       // that requests must have; empty: none
+  std::uint64_t max_request_bytes = 32u << 20;  // maximum size of one body
+  std::string token = {};                       // token that requests must have; empty: none
 };
 
 class MapService {

@@ -11,7 +11,7 @@
 
 namespace bslam::map_service {
 
-// Values of the moment.
+// Current values.
 struct Gauges {
   std::size_t queue_length = 0, queue_capacity = 0, workers = 0, keyframes = 0, landmarks = 0;
 };

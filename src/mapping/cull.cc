@@ -23,7 +23,8 @@ int finest_level(const map::BundledMap& map, const map::Observation& o) {
   return finest;
 }
 
-// Whether at least `count` other keyframes observe the landmark, on a level that is at most one coarser.
+// Returns true if at least `count` keyframes other than k observe the landmark on a pyramid level that is at most one
+// coarser than in k.
 bool observed_elsewhere(const map::BundledMap& map, LandmarkId landmark, KeyframeId k, int count) {
   const auto observations = map.observations(landmark);
   if (static_cast<int>(observations.size()) <= count) return false;
@@ -40,7 +41,7 @@ bool redundant(const map::BundledMap& map, KeyframeId k, const CullingOptions& o
   const auto& landmarks = map.keyframe(k).landmarks;
   const auto all = std::ranges::count_if(landmarks, &LandmarkId::valid);
   const double needed = options.redundant_ratio * static_cast<double>(all);
-  std::ptrdiff_t possible = all;  // those observed elsewhere, and those not yet examined
+  std::ptrdiff_t possible = all;  // landmarks that are observed elsewhere or not yet examined
   for (const LandmarkId l : landmarks) {
     if (!(static_cast<double>(possible) > needed)) return false;
     possible -= l.valid() && !observed_elsewhere(map, l, k, options.redundant_views);

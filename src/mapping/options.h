@@ -29,7 +29,7 @@ struct CreationOptions {
     visitor("max_depth_error", self.max_depth_error, Range{0.001, 10}, "",
             "maximum relative depth error of a new landmark");
     visitor("max_chi2", self.max_chi2, Range{0.1, 1000}, "",
-            "maximum squared normalised error of each of its keypoints");
+            "maximum squared normalised error of each keypoint of a new landmark");
   }
 };
 
@@ -43,14 +43,14 @@ struct FusionOptions {
   static void visit(Self& self, Visitor& visitor) {
     visitor("neighbours", self.neighbours, Range{0, 100}, "", "covisible keyframes searched for duplicates");
     visitor("second_neighbours", self.second_neighbours, Range{0, 100}, "",
-            "covisible keyframes of each of these to search as well");
+            "covisible keyframes of each of these neighbours that are searched as well");
     visitor("max_targets", self.max_targets, Range{0, 1000}, "", "maximum number of keyframes searched");
     mapping::LandmarkFusionOptions::visit(self.search, visitor);
   }
 };
 
 struct CullingOptions {
-  int probation = 3;              // keyframes during which a new landmark is checked
+  int probation = 3;              // number of keyframes during which a new landmark is checked
   double min_found_ratio = 0.25;  // minimum ratio of frames that matched it to frames that predicted it visible
   int min_keypoints = 3;          // minimum number of its keypoints after the probation
   // A keyframe is redundant if more than this fraction of its landmarks is observed by `redundant_views` other
@@ -60,7 +60,8 @@ struct CullingOptions {
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
-    visitor("probation", self.probation, Range{1, 100}, "keyframes", "during which a new landmark is checked");
+    visitor("probation", self.probation, Range{1, 100}, "keyframes",
+            "number of keyframes during which a new landmark is checked");
     visitor("min_found_ratio", self.min_found_ratio, Range{0, 1}, "",
             "minimum ratio of frames that matched a landmark to frames that predicted it visible",
             OptionNote{.formerly = "min_found_share"});
@@ -70,21 +71,21 @@ struct CullingOptions {
             "fraction of landmarks observed by others above which a keyframe is redundant",
             OptionNote{.common = true, .formerly = "redundant_share"});
     visitor("redundant_views", self.redundant_views, Range{1, 100}, "",
-            "number of other keyframes that must observe them");
+            "number of other keyframes that must observe a landmark to count it in redundant_ratio");
   }
 };
 
 struct LocalWindowOptions {
   int free_keyframes = 12;   // the newest keyframe and its best covisible ones
   int fixed_keyframes = 24;  // other keyframes that observe their landmarks, held fixed
-  int max_landmarks = 4000;  // those observed most often are adjusted
+  int max_landmarks = 4000;  // maximum number of adjusted landmarks; those with most observations are chosen
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
     visitor("free_keyframes", self.free_keyframes, Range{1, 1000}, "",
-            "keyframes adjusted: the newest and its best covisible ones", kCommon);
+            "number of free keyframes in an adjustment: the newest one and its best covisible keyframes", kCommon);
     visitor("fixed_keyframes", self.fixed_keyframes, Range{1, 1000}, "",
-            "other keyframes that observe their landmarks, held fixed");
+            "number of fixed keyframes in an adjustment: other keyframes that observe its landmarks");
     visitor("max_landmarks", self.max_landmarks, Range{10, 1000000}, "", "maximum number of landmarks adjusted",
             kCommon);
   }
@@ -100,7 +101,7 @@ struct ScaleOptions {
   int rounds = 4;         // rounds of scale estimation and adjustment per keyframe while the scale changes
   double converged_change = 0.05;       // relative change of the scale below which no further round follows
   double sigma_rotation_deg = 0.5;      // standard deviation of calibrated rotations, per axis
-  double correlated_observations = 10;  // number of observations with the information of one
+  double correlated_observations = 10;  // number of observations that carry as much information as one
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
@@ -110,14 +111,15 @@ struct ScaleOptions {
             "relative standard deviation of the scale below which the map is rescaled");
     visitor("keyframes", self.keyframes, Range{2, 1000}, "",
             "keyframes used to estimate the scale; submaps up to this size are adjusted as a whole");
-    visitor("min_keyframes", self.min_keyframes, Range{2, 1000}, "", "minimum number of keyframes of a metric map");
+    visitor("min_keyframes", self.min_keyframes, Range{2, 1000}, "",
+            "minimum number of keyframes before the map can become metric");
     visitor("rounds", self.rounds, Range{1, 20}, "", "rounds of scale estimation and adjustment per keyframe");
     visitor("converged_change", self.converged_change, Range{0, 1}, "",
             "relative change of the scale below which no further round follows", OptionNote{.formerly = "settled"});
     visitor("sigma_rotation_deg", self.sigma_rotation_deg, Range{0, 20}, "deg",
             "standard deviation of calibrated rotations, per axis");
     visitor("correlated_observations", self.correlated_observations, Range{1, 1e4}, "",
-            "number of observations with the information of one");
+            "number of observations that carry as much information as one");
   }
 };
 

@@ -53,7 +53,7 @@ std::optional<ScaleStep> scale_step(solver::ReducedSystem& system, const Eigen::
 }
 
 // The length of all extrinsics and, unless they are exact, their rotations. The directions of the translations are
-// constant. `inflation`: number of observations with the information that the equations give to one.
+// constant. `inflation`: number of observations that carry the information that the equations assign to one.
 solver::RigBlocks unknowns_of(const solver::RigValues& calibrated, double sigma_rotation, double inflation) {
   constexpr double kExactTranslation = 1e-6;  // metres
   solver::RigBlocks blocks;

@@ -17,7 +17,8 @@ struct RigScaleOptions {
   // Standard deviation of the calibrated rotations of the cameras, rad, per axis; 0: they are exact. On a path that is
   // almost straight, cameras that are slightly turned show the same images as cameras of another distance.
   double sigma_rotation = 0.0;
-  // Number of observations with the information of one: the errors of a landmark in successive images are similar.
+  // Number of observations that carry as much information as one, because the errors of a landmark in successive images
+  // are similar.
   double correlated_observations = 1.0;
 };
 

@@ -16,8 +16,8 @@ constexpr double kMaxScaleStep = 3.0;
 constexpr double kMaxMetricCorrectionSigmas =
     3.0;                                      // in standard deviations: a smaller correction leaves the map metric
 constexpr double kMinCorrectionSigmas = 0.5;  // in standard deviations: a smaller correction is not applied
-// A metric scale that was estimated from motion is checked at every so many keyframes, and is not metric any more if an
-// estimate differs from it by both limits.
+// A metric scale that was estimated from motion is checked at keyframes with this interval. The map is no longer metric
+// if an estimate differs from its scale by more than both limits.
 constexpr std::size_t kCheckInterval = 4;
 constexpr double kContradictionSigmas = 5.0, kContradiction = 0.05;
 
@@ -43,13 +43,14 @@ adjustment::Selection select_observers(const map::BundledMap& map, KeyframeId ke
   return out;
 }
 
-// Whether the scale is estimated at this keyframe. Several submaps share a metric scale, which one of them cannot tell.
+// Returns true if the scale is to be estimated at this keyframe. Several submaps share one metric scale, which cannot
+// be checked with one submap.
 bool due(const map::BundledMap& map, KeyframeId keyframe) {
   if (map.scale() != map::Scale::kMetric) return map.scale() == map::Scale::kUnobservable;
   return map.scale_deviation() > 0 && keyframe.index() % kCheckInterval == 0 && map.roots().size() == 1;
 }
 
-// Whether an estimate from so many keyframes contradicts the scale of a metric map.
+// Returns true if an estimate from this number of keyframes contradicts the scale of a metric map.
 bool contradicts(const RigScale& found, const map::BundledMap& map, std::size_t keyframes,
                  const ScaleOptions& options) {
   const double deviation = std::hypot(found.deviation, map.scale_deviation());
@@ -89,7 +90,8 @@ ScaleReport observe_scale(KeyframeId keyframe, const ScaleOptions& options, cons
     report.correction = correction;
     draft.scale_submap(map.root_of(keyframe), correction);
   }
-  const double left = std::abs(found->scale / correction - 1.0);  // of a scale that was too far off for one step
+  // Remaining relative error of a scale that was too far off for one step.
+  const double left = std::abs(found->scale / correction - 1.0);
   draft.set_scale(map::Scale::kUnobservable, std::max(found->deviation, left));
   return report;
 }

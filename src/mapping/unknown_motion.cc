@@ -3,7 +3,7 @@
 namespace bslam::mapping {
 namespace {
 
-constexpr double kMaxInterval_s = 0.5;  // for which the velocity changes linearly
+constexpr double kMaxInterval_s = 0.5;  // longest interval in which the velocity is assumed to change linearly
 
 }  // namespace
 

@@ -1,4 +1,4 @@
-// The velocity of keyframes from which it was not known when they were created.
+// The velocity of keyframes whose velocity was unknown when they were created.
 #pragma once
 
 #include "map/map_edit.h"

@@ -35,7 +35,8 @@ struct BundlingOptions {
             "maximum distance from the epipolar curve in standard deviations");
     visitor("max_chi2", self.max_chi2, Range{0.1, 1000}, "",
             "maximum squared normalised error of a keypoint to its feature's point");
-    visitor("min_parallax", self.min_parallax, Range{0, 1}, "rad", "minimum parallax of a feature with a point");
+    visitor("min_parallax", self.min_parallax, Range{0, 1}, "rad",
+            "minimum parallax of a matched feature to triangulate its point");
   }
 };
 

@@ -48,7 +48,7 @@ class FrameBuilder {
   // Discards the images.
   void clear();
 
-  // Of the pyramids and masks that it holds.
+  // Memory of the pyramids and masks that it holds, in bytes.
   std::size_t memory_bytes() const;
 
  private:
@@ -57,7 +57,8 @@ class FrameBuilder {
   feature::PyramidShape shape_;
   std::vector<feature::Extractor> extractors_;
   std::vector<image::Image> masks_;
-  std::vector<image::Image> combined_masks_;  // of images that have a mask and whose camera has one, or adopted
+  // Combined masks of images with a mask whose camera has one as well, or adopted masks.
+  std::vector<image::Image> combined_masks_;
   std::vector<image::Pyramid> pyramids_;
   std::vector<image::ImageView> current_masks_;
 };

@@ -55,7 +55,8 @@ struct AlignmentOptions {
 // patch; in stereo pairs of fisheyes this is a systematic error proportional to the disparity.
 struct PatchWarp {
   Eigen::Matrix2d linear = Eigen::Matrix2d::Identity();
-  Eigen::Matrix<double, 2, 3> quadratic = Eigen::Matrix<double, 2, 3>::Zero();  // of x^2, x y, y^2; per pixel
+  // Coefficients of x^2, x y, y^2, in 1/pixel.
+  Eigen::Matrix<double, 2, 3> quadratic = Eigen::Matrix<double, 2, 3>::Zero();
 
   Eigen::Vector2d operator()(const Eigen::Vector2d& offset) const {
     return linear * offset +

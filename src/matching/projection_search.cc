@@ -65,8 +65,9 @@ class View {
   const camera::Camera& camera_;
   const camera::Shutter& shutter_;
   Eigen::Matrix3d R_;
-  Vector3d t_, centre_, axis_;           // metres; centre and optical axis in the common frame
-  double min_cosine_, min_axis_cosine_;  // of the viewing direction of a point, and of the angle to the optical axis
+  Vector3d t_, centre_, axis_;  // metres; centre and optical axis in the common frame
+  // Minimum cosines of the angle between viewing directions and of the angle to the optical axis.
+  double min_cosine_, min_axis_cosine_;
 };
 
 Candidate best_candidate(const feature::Keypoints& keypoints, const feature::Descriptor& descriptor,

@@ -21,8 +21,8 @@ std::vector<std::vector<int>> lower_rows(std::span<const BlockPattern::Position>
   return out;
 }
 
-// The same of L. Eliminating a column connects all of its rows; the first of them, its parent in the elimination tree,
-// passes them on.
+// Returns the rows of each column of L. Eliminating a column connects all of its rows, so that they also become rows of
+// the first of them, its parent in the elimination tree.
 std::vector<std::vector<int>> factor_rows(std::vector<std::vector<int>> rows) {
   for (std::size_t j = 0; j < rows.size(); ++j) {
     std::ranges::sort(rows[j]);
@@ -35,8 +35,8 @@ std::vector<std::vector<int>> factor_rows(std::vector<std::vector<int>> rows) {
   return rows;
 }
 
-// An order in which the children of a column, and theirs, directly precede it. It does not change the number of entries
-// of L.
+// Returns a postorder of the elimination tree: all descendants of a column directly precede it. It does not change the
+// number of entries of L.
 std::vector<int> postorder(const std::vector<std::vector<int>>& rows) {
   const int n = static_cast<int>(rows.size());
   std::vector<std::vector<int>> children(rows.size());
@@ -89,11 +89,11 @@ int total(const std::vector<int>& begin, const std::vector<int>& rows) {
   return sum;
 }
 
-// Whether `next`, which follows `last`, is stored together with it: few more entries are zero then, or the panel is
-// narrow.
+// Returns true if column `next`, which follows `last`, is added to its supernode: this adds only few zeros, or the
+// panel is narrow.
 bool belong_together(const Columns& last, const Columns& next, const std::vector<int>& begin) {
   constexpr int kNarrow = 36;         // columns
-  constexpr double kFewZeros = 0.15;  // of the entries of the columns that are extended
+  constexpr double kFewZeros = 0.15;  // maximum fraction of zeros among the entries of columns that are extended
   if (last.below.empty() || last.below.front() != next.first) return false;
   const int columns = begin[at(last.first + last.count)] - begin[at(last.first)],
             more = begin[at(next.first + next.count)] - begin[at(next.first)];
@@ -164,8 +164,8 @@ void SupernodalCholesky::assemble(const BlockMatrix& A, const Supernode& s) {
   }
 }
 
-// Subtracts what the elimination of a descendant does to the panel: rows `from` to `to` of the descendant are columns
-// of the supernode.
+// Subtracts the contribution of an eliminated descendant from the panel. Rows `from` to `to` of the descendant are
+// columns of the supernode.
 void SupernodalCholesky::subtract(const Supernode& descendant, std::size_t from, std::size_t to, const Supernode& s) {
   const auto rows = static_cast<Eigen::Index>(descendant.rows.size() - from),
              columns = static_cast<Eigen::Index>(to - from);

@@ -35,10 +35,10 @@ class SupernodalCholesky {
 
  private:
   struct Supernode {
-    int first = 0, columns = 0;  // of L
-    std::vector<int> rows;       // of L in ascending order, beginning with those of its columns
-    std::size_t values = 0;      // of its panel, (rows, columns), column-major
-    std::vector<int> blocks;     // of A that belong to it
+    int first = 0, columns = 0;  // columns of L
+    std::vector<int> rows;       // rows of L in ascending order, beginning with those of its columns
+    std::size_t values = 0;      // offset of its panel, (rows, columns), column-major
+    std::vector<int> blocks;     // blocks of A that belong to it
   };
   using Panel = Eigen::Map<Eigen::MatrixXd>;
   using ConstPanel = Eigen::Map<const Eigen::MatrixXd>;
@@ -56,7 +56,7 @@ class SupernodalCholesky {
   // To permuted rows and back.
   Eigen::MatrixXd permuted(const Eigen::MatrixXd& B, bool back) const;
 
-  std::vector<BlockPattern::Position> positions_;  // of the blocks of A
+  std::vector<BlockPattern::Position> positions_;  // positions of the blocks of A
   std::vector<int> size_, offset_;                 // per block row of A; offset of its rows
   std::vector<int> place_;                         // block row of P A P^T per block row of A
   std::vector<int> begin_;                         // first row per block row of P A P^T and one more

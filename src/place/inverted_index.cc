@@ -26,7 +26,7 @@ void InvertedIndex::add(KeyframeId keyframe, std::shared_ptr<const WordVector> w
 }
 
 void InvertedIndex::add(std::span<const Entry> entries) {
-  std::vector<std::size_t> more;  // keyframes that each word gets
+  std::vector<std::size_t> more;  // number of keyframes that are added to each word
   for (const Entry& e : entries) {
     if (!e.words->empty()) more.resize(std::max(more.size(), e.words->words().back().word.index() + 1));
     for (const WeightedWord& w : e.words->words()) ++more[w.word.index()];

@@ -49,7 +49,7 @@ class InvertedIndex {
   std::size_t size_ = 0;
   struct Posting {
     KeyframeId keyframe;
-    float weight;  // of the word in the keyframe
+    float weight;  // weight of the word in the keyframe
   };
   std::vector<std::vector<Posting>> by_word_;  // each list is in order of id
 };

@@ -27,7 +27,7 @@ struct Division {
 };
 
 struct Training {
-  std::vector<Descriptor> descriptor;  // of all images, concatenated
+  std::vector<Descriptor> descriptor;  // descriptors of all images, concatenated
   std::vector<std::uint32_t> image;    // index of the image of each descriptor
   // Permutation of the descriptors: the descriptors of a node are adjacent and in ascending order.
   std::vector<std::uint32_t> order;

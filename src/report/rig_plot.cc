@@ -67,7 +67,7 @@ std::vector<Vector2d> convex_hull(std::vector<Vector2d> points) {
 
 struct DrawnCamera {
   std::string name, colour;
-  Vector3d position, axis_end;    // of the optical axis
+  Vector3d position, axis_end;    // position of the camera, and end of the drawn optical axis
   std::vector<Vector3d> frustum;  // end points of viewing rays
 };
 

@@ -144,7 +144,7 @@ Panel error_panel(const TrajectoryPlotInput& input) {
   Series error;
   error.label = "error";
   error.width_px = 1.4;
-  Trajectory times;  // of the errors, for the median interval
+  Trajectory times;  // the poses of the errors, for the median interval
   std::vector<double> values;
   for (const auto& e : input.errors) {
     times.push_back({e.time_ns, {}});

@@ -1,4 +1,4 @@
-// Where the frames of a run come from: a data set, whose frames are read ahead of time, or live cameras.
+// The source of the frames of a run: a data set, whose frames are read ahead of time, or live cameras.
 #pragma once
 
 #include <condition_variable>
@@ -18,7 +18,7 @@ class FrameSource {
   struct Item {
     image::ImageBundle images;  // without images if the frame was dropped
     double read_ms = 0;         // time for reading and decoding
-    // Time of the frame after it, by which a late frame is recognised; nullopt if it is the last or unknown.
+    // Time of the next frame, used to detect that this one is late; nullopt if there is none or it is unknown.
     std::optional<TimeNs> next_ns = {};
     bool dropped = false;     // the source had no room for it, because processing was too slow
     std::size_t waiting = 0;  // frames that wait behind it
@@ -33,7 +33,7 @@ class FrameSource {
   // nullopt after the last one.
   virtual std::optional<Item> next() = 0;
 
-  // The most memory that frames which were read in advance have held so far, in bytes.
+  // Maximum memory of the frames read in advance so far, in bytes.
   virtual std::size_t largest_bytes() const { return 0; }
 };
 
@@ -64,7 +64,7 @@ class DatasetFrames final : public FrameSource {
   mutable std::mutex mutex_;
   std::condition_variable_any changed_;
   std::deque<Item> ready_;                     // guarded by mutex_, like the next four members
-  std::size_t bytes_ = 0, largest_bytes_ = 0;  // of the images of `ready_`
+  std::size_t bytes_ = 0, largest_bytes_ = 0;  // memory of the images in `ready_`, now and at most
   bool finished_ = false;
   std::exception_ptr failure_;
   std::jthread reader_;  // declared last, so that it stops before the other members are destroyed

@@ -18,10 +18,11 @@ Result<std::vector<calibration::PairEvidence>> test_against_images(const dataset
 // with some frames spread over it that follow each other.
 std::optional<calibration::LateCamera> late_camera(const dataset::Dataset& dataset);
 
-// What some images show of a calibration with which no map was started.
+// The result of testing a calibration against some images, if no map was started with it.
 struct PairsWithoutMap {
-  std::vector<calibration::CameraPair> contradicted;  // whose images show another arrangement; without keyframes
-  int as_given = 0;                                   // number of pairs whose images agree with the calibration
+  // Pairs whose images show another arrangement of the cameras; without keyframes.
+  std::vector<calibration::CameraPair> contradicted;
+  int as_given = 0;  // number of pairs whose images agree with the calibration
 };
 
 // Empty for a data set without frames, such as live cameras.

@@ -1,4 +1,4 @@
-// What shows that a camera is late, as JSON, for the reports of runs and of calibrations.
+// The evidence that a camera is late, as JSON, for the reports of runs and of calibrations.
 #pragma once
 
 #include <nlohmann/json.hpp>

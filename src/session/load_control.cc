@@ -5,9 +5,9 @@
 namespace bslam::session {
 namespace {
 
-constexpr double kLate = 1.0;         // frames behind, from which the level is raised
-constexpr double kInTime = 0.2;       // frames behind, up to which a frame is in time
-constexpr double kEffective_s = 0.2;  // time until a change shows
+constexpr double kLate = 1.0;         // number of frames behind above which the level is raised
+constexpr double kInTime = 0.2;       // maximum number of frames behind at which a frame is in time
+constexpr double kEffective_s = 0.2;  // time until a change takes effect
 
 }  // namespace
 

@@ -18,10 +18,10 @@ class LoadControl {
 
  private:
   int level_ = 0;
-  bool was_late_ = false;               // the last frame; a single one does not change the level
-  TimeNs raised_ns_ = 0;                // when the level was raised last
-  TimeNs calm_since_ns_ = 0;            // since when no frame was late
-  TimeNs lowered_ns_ = 0;               // when the level was lowered last
+  bool was_late_ = false;     // whether the last frame was late; a single late frame does not change the level
+  TimeNs raised_ns_ = 0;      // time at which the level was last raised
+  TimeNs calm_since_ns_ = 0;  // time since which no frame was late
+  TimeNs lowered_ns_ = 0;     // time at which the level was last lowered
   double patience_s_ = kMinPatience_s;  // time without late frames after which the level is lowered
 };
 

@@ -10,7 +10,7 @@
 namespace bslam::session {
 namespace {
 
-// For each landmark of the merged map, that of a part; invalid if it has none.
+// For each landmark of the merged map, its id in one of the maps; invalid if it is not in that map.
 std::vector<LandmarkId> origins(const map::BundledMap& merged, const MapPart& part) {
   std::vector<LandmarkId> out(merged.landmark_slots());
   for (const LandmarkId own : part.map->landmark_ids()) {
@@ -57,7 +57,8 @@ std::vector<double> ratios_of_views(const map::BundledMap& merged, const MapPart
   return ratios;
 }
 
-// Of the median of ratios, of which neighbours see the same landmarks.
+// Relative standard deviation of the median of the ratios, taking into account that neighbouring keyframes observe the
+// same landmarks.
 double deviation_of(const std::vector<double>& ratios, double middle) {
   constexpr double kNormal = 1.4826, kOfMedian = 1.2533, kNeighbours = 3, kLeast = 0.002;
   std::vector<double> away;

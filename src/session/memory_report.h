@@ -1,4 +1,4 @@
-// Which parts of a run hold how much memory at its end, computed from the sizes of their containers.
+// Memory of each part of a run at its end, computed from the sizes of its containers.
 #pragma once
 
 #include "evaluation/trajectory.h"
@@ -13,15 +13,16 @@ struct MemorySources {
   const RunRecord& record;
   const execution::Journal& journal;
   std::vector<const std::vector<system::SubmapTrajectory>*> trajectories;
-  std::size_t read_ahead_bytes = 0;  // most that images which were read in advance have held
+  std::size_t read_ahead_bytes = 0;  // maximum memory of the images read in advance
 };
 
 MemoryReport memory_report(const MemorySources& sources);
 
-// Adds a part that is held for a moment only: its largest size.
+// Adds the largest size of a part that is only held temporarily.
 void add_largest(MemoryReport& report, std::string part, std::size_t bytes);
 
-// Returns the report as a table of text, with what none of the parts holds and the memory of the process at the end.
+// Returns the report as a text table. Its last lines are the memory that belongs to none of the parts, and the memory
+// of the process.
 std::string memory_text(const RunRecord& record);
 
 }  // namespace bslam::session

@@ -20,7 +20,7 @@ namespace {
 
 using storage::SavedMap;
 
-// The features of a map, with which the program may be set to differ.
+// The feature model with the pyramid of the map, which may differ from that of the settings.
 feature::FeatureModel features_of(const map::BundledMap& map, const system::Config& config) {
   feature::FeatureModel features = config.feature_model();
   features.pyramid = map.pyramid();
@@ -62,8 +62,8 @@ std::string reason_of(const looping::JoinAttempts& attempts, const looping::Loop
 }
 
 struct Inputs {
-  map::BundledMap map;                             // of all of them
-  std::vector<std::vector<KeyframeId>> keyframes;  // of each
+  map::BundledMap map;                             // the map of all inputs
+  std::vector<std::vector<KeyframeId>> keyframes;  // keyframes of each input
   std::vector<MapPart> parts;                      // each
 };
 
@@ -104,7 +104,7 @@ std::vector<std::size_t> submaps_of_inputs(const map::BundledMap& map,
   return out;
 }
 
-// Whether the first input is not in the submap of most inputs, or in that of no other one.
+// Returns true if the first input is not in the submap of most inputs, or no other input is in its submap.
 bool is_apart(const map::BundledMap& map, const std::vector<std::vector<KeyframeId>>& inputs) {
   const std::vector<std::size_t> submaps = submaps_of_inputs(map, inputs);
   return submaps.size() > 1 &&

@@ -17,8 +17,8 @@ struct MergedInput {
   std::string file;
   std::string data;           // name of the recording
   std::size_t keyframes = 0;  // its keyframes follow those of the previous input, in the same order
-  std::size_t submap = 0;     // of most of its keyframes: position in the roots of the result
-  std::string reason = {};    // why it is not in the submap of most inputs; empty if it is
+  std::size_t submap = 0;     // submap of most of its keyframes: index into the roots of the result
+  std::string reason = {};    // reason why it is not in the submap of most inputs; empty if it is
 };
 
 struct MergeResult {
@@ -26,7 +26,7 @@ struct MergeResult {
   std::vector<MergedInput> inputs;  // the map with the most keyframes first; the order depends on contents only
   int joined = 0;                   // submaps that were merged into others
   int loops = 0;                    // further loop closures
-  std::vector<ScaleComparison> scales = {};  // of pairs of inputs that have landmarks in common
+  std::vector<ScaleComparison> scales = {};  // one per pair of inputs with common landmarks
 };
 
 // Appends all maps to the one with the most keyframes, whose world frame is kept, and searches a loop closure for every

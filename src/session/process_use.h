@@ -1,4 +1,4 @@
-// What the operating system knows about this process.
+// Resource usage of this process according to the operating system.
 #pragma once
 
 #include <optional>

@@ -76,8 +76,8 @@ bool was_inconsistent(const CameraRecord& camera) {
   });
 }
 
-// Whether the scale has no foundation: of the cameras with images, all but one have contradicted that one nearly from
-// the start.
+// Returns true if the scale is not reliable: all cameras with images but one have been inconsistent with that one
+// nearly from the start.
 bool single_camera_agrees(const RunRecord& record) {
   constexpr double kNearlyAlways = 0.9;
   const auto used = std::ranges::count_if(record.cameras, [](const CameraRecord& camera) { return camera.images > 0; });
@@ -87,7 +87,7 @@ bool single_camera_agrees(const RunRecord& record) {
   return used > 1 && contradicted + 1 >= used;
 }
 
-// Whether anything speaks against the calibration or the time stamps.
+// Returns true if there is evidence against the calibration or the time stamps.
 bool is_contradicted(const CalibrationRecord& calibration) {
   return !calibration.pairs.empty() || !calibration.disagreeing.empty() ||
          calibration.estimate.verdict == calibration::Verdict::kInconsistent;

@@ -35,10 +35,10 @@ std::string trajectory_file(const std::string& stem, std::size_t submap);
 
 std::string_view mode_name(execution::Mode mode);
 
-// A call of a background stage, for the record.
+// Adds one call of a background stage to the record.
 void add_stage_run(RunRecord& record, const system::StageRecord& run, TimeNs first_time_ns);
 
-// The counts and the scale of a map, for the record.
+// Returns the counts and the scale of a map for the record.
 MapRecord map_record(const map::BundledMap& map, bool loaded);
 
 // `frames` contains all frames passed to the system, which are moved into the record.

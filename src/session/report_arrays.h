@@ -11,7 +11,7 @@ namespace bslam::session {
 
 inline constexpr std::size_t kMaxReportPoses = 20'000;
 
-// Beyond these numbers landmarks, and poses and frames, are thinned out.
+// Maximum numbers of landmarks, and of poses and frames; larger sets are subsampled.
 struct ReportLimits {
   std::size_t points = 100'000, poses = kMaxReportPoses;
 };

@@ -10,8 +10,8 @@
 
 namespace bslam::session {
 
-// What is known of a run while it goes on as well: all of report_json but the command, settings and ground truth. `rig`
-// is that of the run.
+// The part of the data that is available during the run: all of report_json except the command, the settings and the
+// comparison with ground truth. `rig` is the rig of the run.
 nlohmann::ordered_json run_json(const RunRecord& record, const map::BundledMap& map, const camera::Rig& rig,
                                 std::span<const system::SubmapTrajectory> paths, TimeNs first_time_ns,
                                 const ReportLimits& limits = {}, const std::optional<geometry::UpAxis>& up = {});

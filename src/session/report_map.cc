@@ -26,7 +26,7 @@ ordered_json number_list(const Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 // Collects the arrays of one submap.
 struct Submap {
   KeyframeId root;
-  std::vector<SE3> T_world_rig;  // of the keyframes
+  std::vector<SE3> T_world_rig;  // poses of the keyframes
   std::vector<float> keyframe_time, keyframe_position, keyframe_rotation, point_position, point_time;
 };
 
@@ -88,10 +88,10 @@ ordered_json path_json(const evaluation::Trajectory& path, TimeNs first_ns, std:
   return {{"time", float_array(time)}, {"position", float_array(position)}, {"rotation", float_array(rotation)}};
 }
 
-// Returns the ray of a pixel at depth 1. Rays farther than this from the optical axis are not drawn: instead the ray of
-// a pixel nearer to the centre is returned.
+// Returns the ray of a pixel at depth 1. If the ray is too far from the optical axis to be drawn, returns the ray of a
+// pixel nearer to the centre.
 Vector3d ray_at_corner(const camera::Camera& camera, const Eigen::Vector2d& corner) {
-  constexpr double kMinDepth = 0.35;  // of a ray of length 1
+  constexpr double kMinDepth = 0.35;  // minimum z of a ray of length 1
   const Eigen::Vector2d centre(0.5 * (camera.width - 1), 0.5 * (camera.height - 1));
   for (double share = 1.0; share > 0.2; share -= 0.05) {
     const auto ray = camera.unproject(centre + share * (corner - centre));

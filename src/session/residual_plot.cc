@@ -13,7 +13,7 @@ namespace {
 using namespace report;  // figures
 using calibration::ImageResiduals;
 
-constexpr std::size_t kMinObservations = 10;  // of a cell that is drawn
+constexpr std::size_t kMinObservations = 10;  // minimum number of observations in a cell that is drawn
 constexpr std::size_t kPanelsPerRow = 3;
 
 // The scale of all arrows.

@@ -28,7 +28,7 @@ struct RigCalibration {
   // Relative standard deviation of the common factor of all distances between cameras, which images do not reveal; 0
   // for a single camera.
   double scale_std = 0;
-  camera::Rig whole;  // as `joint.rig`, with the cameras of the calibration that were not used
+  camera::Rig whole;  // `joint.rig` together with the cameras of the calibration that were not used
 };
 
 // The configuration of a calibration: sequential, always refined, and with the deviations of a rough start.
@@ -46,8 +46,8 @@ Result<camera::Rig> with_nominal_intrinsics(const camera::Rig& rig, const std::s
 Result<RigCalibration> calibrate_rig(std::span<const dataset::Dataset> recordings,
                                      const RigCalibrationRequest& request);
 
-// The result as a table with standard deviations, followed by what the recordings do not reveal and the motion or scene
-// that is missing.
+// The result as a table with standard deviations, followed by a list of values that the recordings do not determine and
+// the motion or scene that would be needed.
 std::string calibration_text(const RigCalibration& calibration);
 // The rig file, with the table as a comment.
 std::string calibrated_rig_yaml(const RigCalibration& calibration);

@@ -63,7 +63,7 @@ std::vector<Row> extrinsics_rows(const RigCalibration& c, std::size_t camera) {
   return out;
 }
 
-// What a parameter of a camera model is, and how to move so that the images determine it.
+// The meaning of a parameter of a camera model, and the motion with which the images determine it.
 std::string missing_for_intrinsics(const std::string& name) {
   if (name == "fx")
     return "horizontal focal length of {} (needs rotation about its y axis, which moves points sideways)";

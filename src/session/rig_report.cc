@@ -82,7 +82,7 @@ std::vector<std::string> warnings_of(const camera::Rig& rig) {
   return warnings;
 }
 
-// A calibration, and where it is from.
+// A calibration and its source.
 struct Calibration {
   rig_formats::RigFile file;
   std::string format;
@@ -113,7 +113,7 @@ Result<Calibration> read_calibration(const RigReportRequest& request) {
   return Calibration{*std::move(file), std::move(format)};
 }
 
-// What the images of a recording show.
+// The results of the test with the images of a recording.
 struct ImageEvidence {
   std::vector<PairEvidence> pairs;
   std::optional<calibration::LateCamera> late;

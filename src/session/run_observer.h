@@ -11,13 +11,13 @@
 
 namespace bslam::session {
 
-// What is known of a frame once it was processed.
+// The result of a processed frame.
 struct ProcessedFrame {
   image::ImageBundle images;
   tracking::FrameRecord record;
   std::vector<tracking::ObservedKeypoints> keypoints;  // per camera
   map::MapSnapshot map;                                // the newest version
-  std::size_t first_camera = 0;                        // of the run, in the rig of the map
+  std::size_t first_camera = 0;                        // index of the run's first camera in the rig of the map
   double read_ms = 0;
 };
 

@@ -75,7 +75,7 @@ std::vector<LostInterval> lost_intervals(const RunRecord& record) {
 
 std::vector<ReducedInterval> reduced_intervals(const RunRecord& record) {
   std::vector<ReducedInterval> intervals;
-  int level = 0;  // of the last frame
+  int level = 0;  // level of reduced work in the last frame
   for (const RunFrame& frame : record.frames) {
     if (!frame.record) continue;
     const bool begins = frame.record->reduction != level;

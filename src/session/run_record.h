@@ -68,7 +68,7 @@ struct CameraRecord {
   std::vector<CameraInterval> states;
   std::optional<ExtrinsicsRecord> extrinsics = {};  // nullopt for camera 0, whose frame is the rig frame
   std::string first_skipped = {};                   // file and cause of damage of the first skipped image
-  // Of the keyframes of the run in the final map; if it only localises, of the poses of its frames.
+  // Residuals of the keyframes of the run in the final map; if the run only localises, of the poses of its frames.
   calibration::ImageResiduals residuals = {};
 };
 
@@ -79,20 +79,20 @@ struct CalibrationRecord {
   // fit wrong matches, or images that were taken at different times.
   bool applies = false;
   bool refined = false;     // the final map uses an estimated rig that applies, which is written to rig_refined.yaml
-  double excess_bound = 0;  // of estimate.excess_error, above which the images contradict the calibration
+  double excess_bound = 0;  // the images contradict the calibration if estimate.excess_error is larger
   std::vector<calibration::CameraPair> pairs =
-      {};                        // that are contradicted or hardly matched; without keyframes if no map was started
+      {};  // pairs of cameras that are contradicted or hardly matched; without keyframes if no map was started
   int pairs_as_given = 0;        // if no map was started: pairs whose images agree with the calibration
-  bool scale_unfounded = false;  // no two cameras agree on which the scale could be based
+  bool scale_unfounded = false;  // the scale is not reliable: there are no two consistent cameras that determine it
   std::vector<std::size_t> disagreeing = {};  // cameras that were inconsistent for most of the run
-  // Looked for if the images contradict the calibration, or a camera was inconsistent for some time.
+  // Tested if the images contradict the calibration, or if a camera was inconsistent for some time.
   std::optional<calibration::LateCamera> late = {};
 
   // Sets `applies` and `refined`. `complete`: the run was not interrupted; the map of an interrupted run may use an
   // estimate from its beginning, of which nothing is known. `replaced`: the map uses an estimated rig.
   void accept_estimate(bool complete, bool replaced);
-  // Whether the images are not those of the calibrated cameras, or the calibration was read in another convention than
-  // meant. Scale, map and estimate mean nothing then.
+  // Returns true if the images are not those of the calibrated cameras, or the calibration was read in a wrong
+  // convention. Scale, map and estimate are meaningless then.
   bool foreign_images() const;
   // The verdict of the estimate, unless the pairs of cameras or single cameras show that it does not apply: the
   // estimate uses only observations that are consistent with each other.
@@ -123,13 +123,13 @@ struct SubmapRecord {
 
 // Counts of what a run did. They are exact: runs in sequential mode that give the same bytes have equal counts.
 struct WorkRecord {
-  std::int64_t images = 0, keypoints = 0;     // images of which keypoints were extracted, and these
-  std::int64_t solver_steps = 0;              // of nonlinear least squares, accepted or rejected
-  std::optional<std::int64_t> allocations{};  // of the heap; nullopt if not counted
+  // Number of images from which keypoints were extracted, and number of these keypoints.
+  std::int64_t images = 0, keypoints = 0;
+  std::int64_t solver_steps = 0;              // steps of nonlinear least squares, accepted or rejected
+  std::optional<std::int64_t> allocations{};  // heap allocations; nullopt if not counted
 };
 
-// What a part of a run holds in memory at its end, and the largest size of one that is held for a moment only. MB are
-// 2^20 bytes.
+// Memory of a part of a run at its end, or the largest size of a part that is only held temporarily. MB are 2^20 bytes.
 struct MemoryPart {
   std::string name;
   double mb = 0.0;
@@ -138,8 +138,8 @@ struct MemoryPart {
 
 struct MemoryReport {
   std::vector<MemoryPart> parts{};      // empty: it was not requested
-  std::optional<double> resident_mb{};  // of the whole process, when the parts were measured
-  double sum_mb() const;                // of the parts
+  std::optional<double> resident_mb{};  // memory of the whole process when the parts were measured
+  double sum_mb() const;                // sum of the parts
 };
 
 struct RunRecord {

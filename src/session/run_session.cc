@@ -56,19 +56,19 @@ void report_frame(RunObserver& observer, FrameSource::Item&& item, system::Frame
                      system);
 }
 
-// The frames that were fed, and whether they are all.
+// The frames that were fed, and whether they are all frames of the run.
 struct Fed {
   std::vector<InputFrame> inputs;
   bool all = false;
-  std::size_t read_ahead_bytes = 0;  // most that frames read in advance have held
+  std::size_t read_ahead_bytes = 0;  // maximum memory of the frames read in advance
 };
 
-// At a recorded pace with Late::kDrop: a frame that is later, and later than the next one is due, is not read, or
-// dropped if another one has been read.
+// Maximum delay of a frame, in seconds, at a recorded pace with Late::kDrop. A frame is dropped if its delay is larger
+// and the next frame is already due; if it has not been read yet, it is not read.
 constexpr double kMaxLateness_s = 0.2;
 
-// Decides which frames are dropped in addition to those that the source has dropped, and how much work is done for the
-// others: at a recorded pace with Late::kDrop, and for live cameras.
+// At a recorded pace with Late::kDrop, and for live cameras: decides which frames are dropped in addition to those that
+// the source has dropped, and the level of reduced work of the others.
 class FrameChoice {
  public:
   explicit FrameChoice(const SessionOptions& options)
@@ -158,7 +158,7 @@ camera::Rig with_refined_calibration(const camera::Rig& found, const dataset::Da
   return dataset.whole_rig ? dataset.whole_rig->with_calibration_of(found, dataset.cameras_used) : found;
 }
 
-// The map at the end of the run; without metric scale if that means nothing.
+// The map at the end of the run, without metric scale if the scale is meaningless.
 map::MapSnapshot map_of(const system::System& system, const RunRecord& record) {
   const map::MapSnapshot map = system.snapshot();
   if (!record.calibration.scale_unfounded || map->scale() != map::Scale::kMetric) return map;
@@ -167,7 +167,7 @@ map::MapSnapshot map_of(const system::System& system, const RunRecord& record) {
   return std::make_shared<const map::BundledMap>(std::move(copy));
 }
 
-// What a run has used between the construction of the system and its end.
+// Resources that a run has used between the construction of the system and its end.
 struct Used {
   double wall_s = 0;
   std::optional<double> cpu_s;
@@ -221,7 +221,7 @@ system::Config config_for(const SessionOptions& options) {
   return config;
 }
 
-// What holds the memory of a run at its end.
+// The memory of the parts of a run at its end.
 void measure_memory(const SessionOptions& options, const system::System& system, const Fed& fed,
                     SessionResult& result) {
   if (!options.memory_report) return;

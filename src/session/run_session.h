@@ -19,7 +19,7 @@
 
 namespace bslam::session {
 
-enum class Pace { kFast, kRealtime };  // as fast as possible, or at the recorded pace
+enum class Pace { kFast, kRealtime };  // kFast: as fast as possible; kRealtime: at the recorded pace
 enum class Late { kBlock, kDrop };  // at the recorded pace: process every frame late, or do less work and drop frames
 
 struct SessionOptions {
@@ -47,7 +47,7 @@ struct SessionResult {
   // One per submap. The first ones are written to trajectory.tum and trajectory_live.tum.
   std::vector<system::SubmapTrajectory> trajectories, live;
   map::MapSnapshot map;                    // its rig may have further cameras, if a map was loaded
-  std::optional<camera::Rig> rig;          // that of the run, with the calibration of the map
+  std::optional<camera::Rig> rig;          // rig of the run, with the calibration of the map
   calibration::RigRefinement calibration;  // the estimate of the calibration at the end of the run
   // If the calibration was refined and the estimate applies (CalibrationRecord::refined): the calibration of all
   // cameras, with the estimate for those in use.

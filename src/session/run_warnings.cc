@@ -40,7 +40,8 @@ void warn_of_extrinsics(const CameraRecord& camera, bool applies, Warnings& warn
        applies && !e->refined ? "; use the estimate with --set calibration.refine=true" : "");
 }
 
-// Warns if focal lengths or principal points changed by much more than their deviation and than calibrations differ.
+// Warns if focal lengths or principal points changed by much more than their standard deviations and usual calibration
+// errors.
 void warn_of_intrinsics(const camera::Camera& camera, const calibration::CameraRefinement& estimate,
                         Warnings& warnings) {
   constexpr double kSigmas = 5, kFocal = 0.02, kCentre = 0.01;  // relative to the focal length and the image width
@@ -55,7 +56,7 @@ void warn_of_intrinsics(const camera::Camera& camera, const calibration::CameraR
   if (!shown.empty()) warn(warnings, "{}: estimated intrinsics differ from the calibration: {}", camera.name, shown);
 }
 
-// Warns if a focal length changed by more than a run can be trusted to find.
+// Warns if a focal length changed by more than a run can estimate reliably.
 void warn_of_wrong_focal_length(const camera::Camera& camera, const calibration::CameraRefinement& estimate,
                                 Warnings& warnings) {
   constexpr double kFar = 0.05;  // relative
@@ -104,8 +105,8 @@ std::string what_became_of_estimate(const RunRecord& record) {
          "their time stamps or extrinsics may be far off";
 }
 
-// Warns of an estimate that differs from the calibration, unless the images do not belong to it: the estimate means
-// nothing then.
+// Warns of an estimate that differs from the calibration, unless the images do not belong to the calibration, in which
+// case the estimate is meaningless.
 void warn_of_estimate(const RunRecord& record, const camera::Rig& rig, Warnings& warnings) {
   const CalibrationRecord& calibration = record.calibration;
   if (calibration.foreign_images()) return;
@@ -197,7 +198,7 @@ void warn_of_disagreement(const RunRecord& record, std::size_t camera, const std
     keypoints += frame.record->final_result().cameras[camera].keypoints;
     inliers += frame.record->final_result().cameras[camera].inliers;
   }
-  // The verdict says little of a camera whose matches did not count.
+  // The verdict does not apply to a camera whose matches were not used.
   warn(warnings, "{}: only {} of {} keypoints are inliers: check this camera's time stamps and extrinsics ({}){}",
        record.cameras[camera].name, inliers, keypoints, check_command,
        record.calibration.verdict() == calibration::Verdict::kConsistent
@@ -245,7 +246,7 @@ void warn_of_pairs(const RunRecord& record, const std::string& check_command, Wa
   }
 }
 
-// What was left out because processing was too slow.
+// Warns of frames and work that were omitted because processing was too slow.
 void warn_of_load(const RunRecord& record, Warnings& warnings) {
   std::int64_t reduced = 0;
   for (const ReducedInterval& interval : reduced_intervals(record)) reduced += interval.frames;

@@ -1,4 +1,4 @@
-// What the comment lines of a trajectory file say about its poses.
+// The comment lines of a trajectory file.
 #pragma once
 
 #include <span>

@@ -29,8 +29,8 @@ std::uint64_t identity_of(const map::BundledKeyframe& keyframe) {
 // A keyframe in both maps.
 struct Link {
   TimeNs time_ns = 0;
-  std::size_t submap = 0;  // of the merged map
-  SE3 T_merged_own;        // of the world frames, where the keyframe is
+  std::size_t submap = 0;  // submap of the merged map
+  SE3 T_merged_own;        // transform between the two world frames, according to this keyframe
 };
 
 bool has_pose_at(const Trajectory& trajectory, TimeNs time_ns) {

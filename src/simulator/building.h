@@ -19,7 +19,7 @@ struct Lamp {
 // The sun: its light is the same everywhere.
 struct Sun {
   Vector3d direction;  // unit vector towards it
-  double irradiance;   // of a surface facing it
+  double irradiance;   // irradiance of a surface facing the sun
 };
 
 // Interior of a room, in metres.

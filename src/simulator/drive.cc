@@ -24,7 +24,7 @@ double angle_between(const Vector2d& a, const Vector2d& b) {
   return std::atan2(a.x() * b.y() - a.y() * b.x(), a.dot(b));
 }
 
-// When each of equidistant points of a route is reached.
+// The times at which equidistant points of a route are reached.
 struct Timetable {
   double step = 0;              // metres between points
   std::vector<double> reached;  // seconds, from 0 to the duration

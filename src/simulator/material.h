@@ -24,7 +24,7 @@ enum class Material {
   kLamp,       // emits light
   kSky,        // clouds over tens of metres; emits light
   kHorizon,    // hills with houses and trees below the sky; emits light
-  kHills,      // as kHorizon, but higher and for larger distances
+  kHills,      // like kHorizon, but higher and for larger distances
   kAsphalt,    // stains, stones, cracks
   kPaving,     // slabs with joints
 };

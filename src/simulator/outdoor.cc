@@ -16,7 +16,7 @@ namespace {
 constexpr double kHalfX = 17.0, kHalfY = 13.0;  // metres: half the size of the square
 constexpr double kBlockX = 6.0, kBlockY = 3.0;  // half the size of the block in the middle
 constexpr double kTourX = 10.5, kTourY = 7.0;   // half the size of the tour
-constexpr double kDepth = 6.0;                  // of the houses around the square
+constexpr double kDepth = 6.0;                  // metres, depth of the houses around the square
 constexpr double kFree = 1.3;                   // distance of street furniture from the tour
 constexpr double kSky = 90.0, kSkyHeight = 70.0;
 

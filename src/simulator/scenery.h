@@ -1,5 +1,5 @@
-// What a recording shows: the motion of the rig, and the world around each section of its way. Long drives have many
-// sections, of which one at a time is in memory.
+// The content of a recording: the motion of the rig, and the world around each section of its path. Long drives have
+// many sections; one at a time is in memory.
 #pragma once
 
 #include <functional>
@@ -16,7 +16,8 @@ struct Scenery {
   synthetic::Trajectory trajectory;
   std::vector<double> section_ends;  // seconds; the last one is the duration of the trajectory
   std::function<Building(std::size_t section)> building;
-  std::function<Building(std::size_t section)> obstacles;  // all that a rig could touch, and perhaps nothing else
+  // All surfaces that a rig could touch; other surfaces may be missing.
+  std::function<Building(std::size_t section)> obstacles;
   WorldOptions world;
 
   std::size_t section_at(double time_s) const;

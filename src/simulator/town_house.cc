@@ -80,7 +80,8 @@ void add_town_house(Building& b, const Facade& f, Random& random, Detail detail)
   const Vector2d out = left_of(f.along), middle = f.start + 0.5 * f.length * f.along - 0.5 * kHouseDepth * out;
   const std::size_t first = b.surfaces.size();
   add_box(b.surfaces, {at_height(middle, 0), {f.length, kHouseDepth, f.height}, yaw_of(f)}, wall, roof);
-  constexpr std::array kTexels = {kBackTexel, kSideTexel, 0.0, kSideTexel, kBackTexel};  // of the faces of a box
+  // Texel sizes of the faces of a box.
+  constexpr std::array kTexels = {kBackTexel, kSideTexel, 0.0, kSideTexel, kBackTexel};
   for (std::size_t i = 0; i < kTexels.size(); ++i) b.surfaces[first + i].min_texel = kTexels[i];
   const double inset = random.uniform(0.6, 1.4), attic = random.uniform(1.2, 2.4);
   add_box(b.surfaces, {at_height(middle, f.height), {f.length - inset, kHouseDepth - 2 * inset, attic}, yaw_of(f)},

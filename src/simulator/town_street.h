@@ -10,8 +10,8 @@ namespace bslam::simulator {
 
 // A street between two crossings.
 struct StreetPiece {
-  std::size_t axis = 0;              // of the street: 0: x, 1: y
-  Vector2d start, along;             // in the middle of the road; unit vector
+  std::size_t axis = 0;              // direction of the street: 0: x, 1: y
+  Vector2d start, along;             // a point in the middle of the road; unit vector along it
   double length = 0, half_road = 0;  // metres
 
   Vector2d at(double along_m, double left_m) const { return start + along_m * along + left_m * left_of(along); }

@@ -109,7 +109,7 @@ World::World(World&&) noexcept = default;
 World& World::operator=(World&&) noexcept = default;
 
 bool World::hidden_by_others(const Surface& s) const {
-  constexpr std::size_t kPlaces = 16;  // of the tour
+  constexpr std::size_t kPlaces = 16;  // number of sampled places of the tour
   constexpr std::array<std::array<double, 2>, 5> kPoints = {
       {{0.5, 0.5}, {0.1, 0.9}, {0.9, 0.9}, {0.1, 0.1}, {0.9, 0.1}}};
   const std::size_t step = std::max<std::size_t>(1, building_.tour.size() / kPlaces);

@@ -14,11 +14,12 @@
 namespace bslam::simulator {
 
 struct WorldOptions {
-  double texel = 0.005;               // metres per texel near the tour; surfaces farther away have larger texels
-  double texel_per_distance = 0.002;  // radians; of surfaces farther away: about one pixel of the default cameras
-  double light_texel = 0.10;          // metres between samples of the light
-  int ambient_rays = 24;              // rays per light sample for ambient occlusion
-  double hidden_texel = 0.25;         // metres per texel of surfaces that face away from the whole tour
+  double texel = 0.005;  // metres per texel near the tour; surfaces farther away have larger texels
+  // Radians, angular texel size of farther surfaces: about one pixel of the default cameras.
+  double texel_per_distance = 0.002;
+  double light_texel = 0.10;   // metres between samples of the light
+  int ambient_rays = 24;       // rays per light sample for ambient occlusion
+  double hidden_texel = 0.25;  // metres per texel of surfaces that face away from the whole tour
   // Metres; larger texels are means of two samples of the albedo in each direction. 0: of one sample.
   double sample_spacing = 0;
   // Metres; surfaces farther from the tour have coarse texels if others hide them. 0: none.
@@ -70,7 +71,7 @@ class World {
     std::int32_t width, height;  // texels of the finest level
     float texels_per_m;
     bool hidden;           // not visible from the tour, therefore without details and shadows
-    std::int32_t samples;  // of the albedo per texel, in each direction
+    std::int32_t samples;  // samples of the albedo per texel, in each direction
     std::int32_t levels;
     std::uint32_t texel[kLevels];            // first texel of each level
     std::int32_t light_width, light_height;  // numbers of samples, including those on the edges

@@ -10,7 +10,8 @@ namespace bslam::solver {
 
 namespace {
 
-// Extrinsics and intrinsics in radians, metres and the units of the models. Their priors must be subtracted.
+// Rig blocks for the extrinsics in radians and metres and the intrinsics in the units of the models. The blocks contain
+// priors, which the caller must subtract from the information.
 RigBlocks calibration_blocks(const RigValues& rig) {
   IntrinsicPrior intrinsics;
   for (const camera::CameraModel& model : rig.models) {
@@ -39,8 +40,9 @@ std::vector<std::uint8_t> thinned_out(const ReprojectionProblem& problem, const 
   return out;
 }
 
-// L of BundleOptions::rig_prior, from the factorised equations of all points with these blocks. Both the noise and the
-// information of inliers are biased by the bound of outliers. Nullopt if the equations are singular with the prior.
+// Computes L of BundleOptions::rig_prior from the factorised equations of all points with these blocks. Corrects for
+// the outlier bound, which makes the noise and the information of the inliers look better than they are. Nullopt if the
+// equations are singular with the prior.
 std::optional<Eigen::MatrixXd> deviation_after(const BundleOptions& options, const RigBlocks& blocks,
                                                const BundleEquations& equations) {
   const ReducedSystem::RigEquations rig = equations.rig_equations();
@@ -68,8 +70,8 @@ std::vector<std::optional<geometry::PoseUncertainty::Effect>> effects_beside_fix
   return equations.rig_effects(options.marginals, *options.rig_deviation, options.fixed_effects);
 }
 
-// The effect of the deviation of the rig on the poses. It is a ratio of two quantities that grow in the same way with
-// the number of points, so that some of them suffice if the deviation is known.
+// The effect of the deviation of the rig on the poses, -S^-1 B L. S and B both grow in proportion to the number of
+// points, so that a subset of the points suffices if the deviation is known.
 std::vector<std::optional<geometry::PoseUncertainty::Effect>> effects_of_rig(
     const ReprojectionProblem& problem, const BundleStructure& structure, const BundleOptions& options, Kernel kernel,
     const BundleState& state, const std::vector<double>& chi2, std::span<const std::uint8_t> skip) {

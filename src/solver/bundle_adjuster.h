@@ -46,15 +46,14 @@ struct BundleOptions {
   // A square root L, (n, any), of the covariance L L^T of the calibration, which the adjustment keeps constant. Rows:
   // rotation (rad) and translation (m) of cameras 1 to N-1, then the intrinsics of all cameras. Null if it is exact.
   std::shared_ptr<const Eigen::MatrixXd> rig_deviation = {};
-  // The effect of the error of the calibration, z with error L z, on each fixed pose; free poses have no columns.
-  // Empty: none. A fixed pose keeps its value, but if the calibration were another one, it would have another value,
-  // too.
+  // The effect of the calibration error L z, z ~ N(0, I), on each fixed pose; free poses have no columns. Empty: none.
+  // A fixed pose keeps its value in the adjustment, but with another calibration it would have had another value.
   std::vector<geometry::PoseUncertainty::Effect> fixed_effects = {};
   // If the calibration has not been compared with images yet: the inverse of its covariance, (n, n). The images of the
-  // problem then tell more about it: L, (n, n + 1), is a square root of the covariance of the estimate from this prior
-  // and the images, and, in the last column, the difference between this estimate and the calibration.
+  // problem then add information about it. L, (n, n + 1), consists of a square root of the covariance of the estimate
+  // from this prior and the images, and, in the last column, the difference between this estimate and the calibration.
   std::shared_ptr<const Eigen::MatrixXd> rig_prior = {};
-  double correlated_observations = 1;  // number of observations with the information of one, for `rig_prior`
+  double correlated_observations = 1;  // number of observations that carry as much information as one, for `rig_prior`
 };
 
 struct BundleSummary : LmSummary {

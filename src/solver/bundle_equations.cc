@@ -291,7 +291,8 @@ std::vector<std::optional<geometry::PoseUncertainty::Effect>> BundleEquations::r
   return rows_of(poses, system_.rig_sensitivity() * rig_deviation);
 }
 
-// With the poses x whose effects are sought and those f whose effects F_f are given, S_xx F_x = -(B_x L + S_xf F_f).
+// Solves S_xx F_x = -(B_x L + S_xf F_f) for the effects F_x on poses x, where the effects F_f on the other poses f are
+// given.
 std::vector<std::optional<geometry::PoseUncertainty::Effect>> BundleEquations::rig_effects(
     std::span<const int> poses, const Eigen::MatrixXd& rig_deviation,
     std::span<const geometry::PoseUncertainty::Effect> given) {

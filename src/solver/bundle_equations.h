@@ -54,10 +54,10 @@ class BundleEquations {
   // linearise().
   ReducedSystem::RigEquations rig_equations() const { return system_.rig_equations(); }
 
-  // Of each of these poses at the last linearise(), with all other poses and points marginalised out: the covariance
-  // for a rig that is exact, and the effect of a rig whose unknowns have the error rig_deviation z, z ~ N(0, I).
-  // Nullopt if the pose is not a variable or the equations are singular. Effects need a successful factorise() or
-  // rig_information() since the last linearise().
+  // Uncertainty of each of these poses at the last linearise(), with all other poses and points marginalised out: the
+  // covariance for an exact rig, and the effect of the rig error rig_deviation z, z ~ N(0, I). Nullopt if the pose is
+  // not a variable or the equations are singular. Effects need a successful factorise() or rig_information() since the
+  // last linearise().
   std::vector<std::optional<geometry::Matrix6d>> pose_covariances(std::span<const int> poses);
   std::vector<std::optional<geometry::PoseUncertainty::Effect>> rig_effects(std::span<const int> poses,
                                                                             const Eigen::MatrixXd& rig_deviation) const;

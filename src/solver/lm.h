@@ -29,7 +29,8 @@ struct LmOptions {
   double min_gain = 1e-3;           // minimum ratio of actual to predicted decrease of an accepted step
   DampingRule rule = DampingRule::kNielsen;
   double first_damping = 1e-4;  // factor of the diagonal, initially or after the first failure
-  double unit_cost = 1.0;       // cost of a residual as large as its noise; 1e-10 of it counts as nothing
+  // Cost of a residual as large as its noise; changes of the cost below 1e-10 of it are ignored.
+  double unit_cost = 1.0;
 };
 
 enum class LmStop { kConverged, kIterations, kStopped, kFailed };
@@ -144,7 +145,7 @@ class SmallProblem {
 
   double linearise() { return equations_.cost; }  // built by trial_cost()
   std::optional<double> solve(double damping) {
-    constexpr double kRidge = 1e-9;  // of the largest diagonal entry; regularises undetermined directions
+    constexpr double kRidge = 1e-9;  // relative to the largest diagonal entry; regularises undetermined directions
     Eigen::Matrix<double, N, N> damped = equations_.H;
     damped.diagonal() *= 1.0 + damping;
     damped.diagonal().array() += kRidge * equations_.H.diagonal().maxCoeff();

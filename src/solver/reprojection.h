@@ -72,9 +72,9 @@ struct ReprojectionResidual {
                                             const Vector3d& point_world, const Vector2d& pixel);
 };
 
-// Of observations with two degrees of freedom that are cut off at their 95 % bound c, the fraction 0.95 is left, with
-// the variance (and its derivative) 1 - exp(-c/2) (1 + c/2) = 0.80 of the whole. Covariances from the inverse of the
-// normal equations of those that are left are too small by the ratio of the two (docs/math.md, section 4).
+// If observations with two degrees of freedom are truncated at their 95 % bound c, a fraction 0.95 of them remains.
+// Their variance (and its derivative) is 1 - exp(-c/2) (1 + c/2) = 0.80 of that of all. Covariances from the normal
+// equations of the remaining observations are therefore too small by 0.80 / 0.95 (docs/math.md, section 4).
 constexpr double kFractionLeft = 0.95, kVarianceLeft = 0.80;
 
 // Bound of chi-square with two degrees of freedom at 95 %.

@@ -18,8 +18,8 @@ struct RigValues {
   std::vector<camera::CameraTiming> timing;
 
   static RigValues of(const Rig& rig);
-  // `rig`, to whose capture times the timing refers, with these values, whose rig frame must be that of camera 0; that
-  // camera keeps its pose in the body.
+  // Returns `rig` with these values. The timing is relative to the capture times of `rig`. The rig frame of the values
+  // must be the frame of camera 0, which keeps its pose in the body.
   Rig applied_to(const Rig& rig) const;
 };
 
@@ -27,10 +27,10 @@ struct RigValues {
 struct RigObservation {
   int camera = 0;
   const RigValues& values;    // the extrinsics do not include the motion from the time of the pose to that of the image
-  const Vector3d& point_cam;  // metres, at the capture time of the image
+  const Vector3d& point_cam;  // metres, when the row of the pixel was exposed
   const Matrix23d& J;         // d pixel / d point_cam, divided by sigma
   const Vector3d& velocity;   // d point_cam / d time, m/s; zero if it is not known
-  double relative_row;        // of the pixel: -1/2 for the first row, 1/2 for the last
+  double relative_row;        // row of the pixel: -1/2 for the first row, 1/2 for the last
   double inverse_sigma;       // 1 / px
 };
 
@@ -43,7 +43,7 @@ class RigBlock {
 
   virtual ~RigBlock() = default;
   virtual int size() const = 0;  // number of unknowns
-  // The range of its unknowns on which pixels of a camera depend.
+  // The range of its unknowns that affect the pixels of a camera.
   virtual Range columns(int camera) const = 0;
   // Derivatives of the pixel with respect to those unknowns, divided by sigma: (2, columns(camera).size).
   virtual void evaluate(const RigObservation& observation, Eigen::Ref<Jacobian> J) const = 0;
@@ -59,15 +59,15 @@ using RigBlocks =
 
 // Prior for the extrinsics of all cameras but the first: normal distributions around the calibrated values, and one of
 // the common scale of all baselines, the root of sum |c|^2 / sum |c'|^2 with the estimated and calibrated camera
-// centres c and c' in the rig frame: distances keep their lengths also if their directions were wrong. Images do not
-// reveal this scale, so that it needs a prior of its own, however uncertain the extrinsics are.
+// centres c and c' in the rig frame: this depends on the lengths of the baselines only, not on their directions. Images
+// do not determine this scale, so that it needs a separate prior, however uncertain the extrinsics are.
 struct ExtrinsicPrior {
   std::vector<SE3> T_cam_rig;                        // calibrated, per camera
   double sigma_rotation = 0, sigma_translation = 0;  // radians, metres; per axis
   // Metres, additionally along the optical axes of the camera and of camera 0: to a calibration, an error of the focal
   // length looks like a displacement along the axis.
   double sigma_depth = 0;
-  double sigma_scale = 0;  // relative; 0: no prior of its own
+  double sigma_scale = 0;  // relative standard deviation of the scale; 0: no separate prior
   // Per camera: its position is far from the calibrated one. Its translation gets ten times the deviation, and its
   // baseline does not count for the scale. Empty: none.
   std::vector<std::uint8_t> displaced = {};
@@ -115,7 +115,7 @@ class ExtrinsicsBlock : public RigBlock {
 // known better than either.
 struct IntrinsicPrior {
   std::vector<camera::ModelParameters> values, sigmas;  // per camera; the sigmas must be positive
-  double sigma_aspect = 0;                              // of fx / fy, relative; 0: no prior of its own
+  double sigma_aspect = 0;                              // relative standard deviation of fx / fy; 0: no separate prior
 };
 
 // The parameters of the camera models of all cameras (camera/model_parameters.h), relative to their standard deviations

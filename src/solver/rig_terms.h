@@ -69,7 +69,7 @@ class RigTerms {
   Eigen::VectorXd b_;
   std::vector<double> W_;                    // coupling of each point with its unknowns: three rows, point by point
   std::vector<std::size_t> first_coupling_;  // per point, and the end: number of unknowns of all points before
-  std::vector<Run> runs_;                    // of each point, ascending
+  std::vector<Run> runs_;                    // runs of each point, ascending
   std::vector<std::size_t> first_run_;       // per point, and the end
   double* W_of_point_ = nullptr;             // the rows of W_ of the current point,
   std::ptrdiff_t W_columns_ = 0;             // their number of columns,

@@ -21,7 +21,7 @@
 
 namespace bslam::storage {
 
-// Arrays in files of version 5 begin at multiples of so many bytes, so that they can be used where they are.
+// Alignment in bytes of arrays in files of version 5, so that they can be used in place.
 constexpr std::size_t kAlignment = 8;
 
 template <class T>

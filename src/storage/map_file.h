@@ -19,7 +19,8 @@ struct MapFileInfo {
   std::uint64_t vocabulary = 0;  // Vocabulary::id() of the visual words of its keyframes; 0 if they have none
   std::string version;           // version of the program that wrote the file
   std::string data;              // name of the recording
-  std::string warning = {};      // why its poses cannot be relied on, if the run that wrote it has found that
+  // Reason why its poses cannot be relied on, as found by the run that wrote it; may be empty.
+  std::string warning = {};
 };
 
 struct SavedMap {
@@ -27,7 +28,7 @@ struct SavedMap {
   map::BundledMap map;
   MapFileInfo info;
   std::size_t words_end = 0;                    // one more than the highest word id of its keyframes
-  std::array<std::uint32_t, 4> checksums = {};  // of the sections of the file
+  std::array<std::uint32_t, 4> checksums = {};  // checksums of the sections of the file
 };
 
 // Writes the keyframes and landmarks that are not removed, with consecutive ids in the same order. Words are omitted

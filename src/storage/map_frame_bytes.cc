@@ -17,7 +17,7 @@ using frame::KeypointRef;
 constexpr double kUnitTolerance = 1e-6;
 constexpr double kMaxTwist = 1e6;             // rad/s, m/s
 constexpr TimeNs kMaxTime = TimeNs{1} << 62;  // bounded so that differences do not overflow
-constexpr std::size_t kPointNumbers = 3 + 9;  // of a triangulated point and its covariance
+constexpr std::size_t kPointNumbers = 3 + 9;  // numbers of a triangulated point and its covariance
 
 // Arrays of these types are written and read as arrays of numbers.
 static_assert(sizeof(Eigen::Vector2f) == 2 * sizeof(float) && sizeof(Eigen::Vector3d) == 3 * sizeof(double));

@@ -54,7 +54,7 @@ struct KeyframeSection {
   std::vector<KeyframeId> parents;
   std::size_t words_end = 0;  // one more than the highest word id
 };
-// Of a map with the rig and pyramid of `map`.
+// The keyframes must belong to the rig and pyramid of `map`.
 KeyframeSection take_keyframes(SectionReader& in, bool with_words, const map::BundledMap& map, ThreadPool& pool);
 
 // The landmarks of a map, one array for each of their properties.
@@ -63,18 +63,18 @@ struct LandmarkSection {
   SharedArray<feature::Descriptor> descriptor;
   SharedArray<Eigen::Vector2f> distances;  // smallest and largest
   SharedArray<KeyframeId> reference, born;
-  SharedArray<frame::KeypointRef> keypoint;  // of the reference
+  SharedArray<frame::KeypointRef> keypoint;  // reference keypoint
   SharedArray<std::uint32_t> expected, found;
-  SharedArray<std::uint32_t> counts;  // of observations
+  SharedArray<std::uint32_t> counts;  // numbers of observations
   SharedArray<KeyframeId> observing;  // the keyframes of all observations, landmark by landmark
-  SharedArray<FeatureId> features;    // and their features
+  SharedArray<FeatureId> features;    // the features of all observations
   SharedArray<std::uint8_t> aligned;
 
   map::Landmark landmark(std::size_t i) const;
 };
 LandmarkSection take_landmarks(SectionReader& in);
 
-// In map_version_4.cc: the same of files before version 5.
+// In map_version_4.cc: the same for files before version 5.
 KeyframeSection take_keyframes_4(SectionReader& in, bool with_words, const map::BundledMap& map);
 LandmarkSection take_landmarks_4(SectionReader& in);
 frame::BundledFrame take_frame_4(SectionReader& in, const camera::Rig& rig, const feature::PyramidShape& pyramid,

@@ -32,7 +32,7 @@ class Waves {
   std::array<double, 3> phase_{};
 };
 
-// The sway of one lap relative to the path.
+// The sway of one lap relative to the path, without units.
 struct Sway {
   explicit Sway(Random& random)
       : lateral(random, {2, 3, 7}),
@@ -44,12 +44,13 @@ struct Sway {
   Waves lateral, up, step, yaw, pitch, roll;
 };
 
-// Offsets from the path. `lap_sway` belongs to one lap and fades out at its ends, so that consecutive laps connect.
+// Offsets from the path: lateral and up in metres, angles in radians.
 struct Offsets {
   double lateral, up, yaw, pitch, roll;
 };
 
-// `base` is the same for all laps; `lap_phase` runs from 0 to 1 over a lap.
+// The sum of `base`, which is the same for all laps, and `lap_sway`, which belongs to one lap and fades out at its
+// ends, so that consecutive laps connect. `lap_phase` runs from 0 to 1 over a lap.
 Offsets offsets_at(const Sway& base, const Sway& lap_sway, double lap_phase);
 
 // The sway of a vehicle on a street: a few centimetres and tenths of a degree. Periodic over kPeriod_s.

@@ -1,4 +1,5 @@
-// The images and records of a run whose rig is a part of the rig of its map: the map has cameras of other rigs as well.
+// Conversions for a run in a map that also has cameras of other rigs, so that the rig of the run is a part of the rig
+// of the map.
 #pragma once
 
 #include <vector>
@@ -18,16 +19,16 @@ bool shared_with_other_rigs(const map::BundledMap& map, const camera::Rig& rig);
 // Checks the settings of a run with `rig` in the loaded map: in a map with other rigs, the calibration cannot be
 // refined.
 Status check_settings(const Config& config, const map::BundledMap& map, const camera::Rig& rig);
-// Sets what is in force in a map with other rigs: the calibration is not estimated.
+// Adapts the settings to a map with other rigs: the calibration is not estimated.
 void note_other_rigs(const map::BundledMap& map, const camera::Rig& rig, Config& config);
 
-// The images as those of the map's rig, which has `all` cameras: the other cameras have no images. The pixels are
+// Returns the images for the rig of the map, which has `all` cameras; the other cameras have no images. The pixels are
 // borrowed from `images`.
 image::ImageBundle widened(const image::ImageBundle& images, CamerasOfRun cameras, std::size_t all);
 // One mask per camera of the map's rig; none if there are none.
 std::vector<image::Image> widened(std::vector<image::Image> masks, CamerasOfRun cameras, std::size_t all);
 
-// Removes what a record says about the cameras of other rigs.
+// Removes the entries of a record for the cameras of other rigs.
 void narrow(tracking::FrameRecord& record, CamerasOfRun cameras);
 void narrow(tracking::TrackResult& result, CamerasOfRun cameras);
 void narrow(std::vector<tracking::ObservedKeypoints>& keypoints, CamerasOfRun cameras);

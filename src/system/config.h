@@ -53,7 +53,7 @@ struct Config {
     visitor("final_adjustment", self.final_adjustment, Range{}, "", "global bundle adjustment at the end", kCommon);
     visitor("localize_only", self.localize_only, Range{}, "", "localise in a loaded map, which is not changed",
             kCommon);
-    visitor("mode", self.mode, Range{}, "", "when stages run", kCommon);
+    visitor("mode", self.mode, Range{}, "", "when background stages run", kCommon);
     visitor.section("io", self.io);
     visitor.section("execution", self.execution);
     visitor.section("health", self.health);

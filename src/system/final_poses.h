@@ -12,7 +12,7 @@
 
 namespace bslam::system {
 
-// The record of a frame, or the end. `records` are in order of frames.
+// Returns an iterator to the record of a frame, or the end iterator. `records` must be in order of frame ids.
 template <class Records>
 auto find_record(Records& records, FrameId frame) {
   const auto at =
@@ -23,18 +23,17 @@ auto find_record(Records& records, FrameId frame) {
 // Pose of a frame in `map`. Returns nullopt if the frame has none or its submap was removed from `map`.
 std::optional<geometry::SE3> T_rig_world_of(const tracking::FrameRecord& record, const map::BundledMap& map);
 
-// Poses of all frames of a run in which the rig was calibrated. Frames between two keyframes were tracked with another
-// calibration than that of the final map, so that their motion relative to one keyframe does not fit the other. The
-// difference is distributed over the frames between them in proportion to time. Where the calibration changed between
-// two keyframes, only those before the change have the larger difference: the first frame after it keeps its pose like
-// a keyframe. `first`: the first keyframe of the run.
+// Poses of all frames of a run whose calibration was refined. Frames between two keyframes were tracked with an earlier
+// calibration than that of the final map, so that their motion relative to the first keyframe does not end at the
+// second one. This difference is distributed over the frames in proportion to time. The first frame after a change of
+// the calibration keeps its pose, as keyframes do. `first`: the first keyframe of the run.
 std::vector<std::optional<geometry::SE3>> poses_between_keyframes(const map::BundledMap& map, KeyframeId first,
                                                                   std::span<const tracking::FrameRecord> frames);
 
-// Motion of the rig during the capture of keyframes, by constant acceleration through the previous frame, the keyframe
-// and the next frame, which was not available during tracking. Contains the keyframes with ids from `first` on that
-// have late cameras, if both adjacent frames have a pose, are within tracking::kMaxPrediction_s and connected without
-// relocalisation. `frames`: all frames of the run, in order.
+// Twist of the rig during the capture of each keyframe, assuming constant acceleration from the previous frame to the
+// next one. Tracking did not know the next frame. Returned for keyframes with ids from `first` on whose cameras have
+// different capture times, if both adjacent frames have a pose, are at most tracking::kMaxPrediction_s away and were
+// reached without relocalisation. `frames`: all frames of the run, in order.
 std::vector<std::pair<KeyframeId, geometry::Vector6d>> twists_from_neighbours(
     const map::BundledMap& map, KeyframeId first, std::span<const tracking::FrameRecord> frames);
 

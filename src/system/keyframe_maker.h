@@ -1,5 +1,5 @@
-// Creates keyframes of frames that were tracked directly: extracts, bundles and tracks their features, in a background
-// stage beside the tracking of the next frames.
+// Creates keyframes from frames that were tracked directly: a background stage extracts, bundles and tracks their
+// features while the next frames are tracked.
 #pragma once
 
 #include <functional>
@@ -22,12 +22,12 @@ struct DeferredKeyframe {
   matching::ReleasedImages images;
   std::vector<int> budgets;                           // number of keypoints, per camera
   std::vector<matching::AlignmentOptions> alignment;  // per camera
-  std::shared_ptr<const camera::Rig> rig;             // with which the frame was tracked
+  std::shared_ptr<const camera::Rig> rig;             // rig with which the frame was tracked
 };
 
-// What the features of a frame have shown.
+// Results of extracting and tracking the features of a frame.
 struct FeatureEvidence {
-  std::vector<double> budget_fractions;         // of the feature budget, per camera
+  std::vector<double> budget_fractions;         // fraction of the feature budget, per camera
   std::vector<tracking::CameraCounts> cameras;  // per camera
 };
 
@@ -40,17 +40,17 @@ class KeyframeMaker {
   KeyframeMaker(const camera::Rig& rig, const Config& config, std::unique_ptr<tracking::Relocaliser> relocaliser,
                 KeyframeObserver observer);
 
-  // Accepts a frame, of which `make` then creates the keyframe. Thread-safe.
+  // Accepts a frame from which `make` then creates the keyframe. Thread-safe.
   void request(DeferredKeyframe deferred);
 
   // Forgets a request. Thread-safe.
   void withdraw(FrameId frame) { take(frame); }
 
-  // The stage: the draft of the keyframe of a frame that was requested, in `base`. No draft if its features give no
-  // pose, or the map was emptied since. To be called by one thread at a time.
+  // The function of the stage: returns a draft on `base` with the keyframe of a requested frame. No draft if its
+  // features give no pose, or if the map has been emptied since the request. Must be called by one thread at a time.
   execution::StageResult make(FrameId frame, const map::MapSnapshot& base);
 
-  // What the features of a frame have shown; known once its keyframe is in the map. Thread-safe.
+  // Returns these results for a frame; available once its keyframe is in the map. Thread-safe.
   FeatureEvidence take_evidence(FrameId frame);
 
   // As in pipeline.h. Not while `make` runs.

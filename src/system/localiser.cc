@@ -22,7 +22,7 @@ Config config_to_localise(Config config) {
   return config;
 }
 
-// Gives every frame the same version of the map, which nothing changes.
+// Returns the same version of the map for every frame, and changes nothing.
 class FixedMap final : public execution::StageExecutor {
  public:
   explicit FixedMap(map::MapSnapshot map) : map_(std::move(map)) {}
@@ -64,7 +64,7 @@ class SharedPlaces final : public looping::PlaceRecogniser {
   looping::BagOfWordsRecogniser recogniser_;
 };
 
-// The share of one thread in the index.
+// The interface of one thread to the shared index.
 class PlacesOfThread final : public looping::PlaceRecogniser {
  public:
   explicit PlacesOfThread(std::shared_ptr<looping::PlaceRecogniser> places) : places_(std::move(places)) {}

@@ -1,5 +1,5 @@
-// Localisation of single frames in a map that is not changed: each frame is relocalised as the first frame of a run in
-// a loaded map is, and independently of all other frames.
+// Localisation of single frames in a map that is not changed. Each frame is relocalised like the first frame of a run
+// in a loaded map, independently of all other frames.
 #pragma once
 
 #include <memory>
@@ -16,17 +16,17 @@
 
 namespace bslam::system {
 
-// Returns true if a camera has landmarks of the map in view of which hardly any, or of many significantly less than
-// half, are where the pose of the frame expects them: images under the names of other cameras, or another rig. A run
-// would find out with the frames that follow.
+// Returns true if hardly any of the landmarks in view of a camera, or significantly less than half of many, are found
+// where the pose of the frame predicts them. This indicates images under the names of other cameras, or another rig. A
+// run would detect it in the following frames; here there is only one frame.
 bool contradicts_pose(const tracking::CameraCounts& camera);
 
 // Holds one copy of the map and of the index of places, which all threads share. All functions are thread-safe.
 class Localiser {
  public:
   // `map` must have at least one keyframe; if it does not have the cameras of `rig`, they are appended. Masks: one per
-  // camera of the rig, empty if it has none; or no masks at all. The settings that do not matter for the localisation
-  // of a frame are ignored. The index of places is computed here, which takes about a millisecond per keyframe.
+  // camera of the rig, empty if it has none; or no masks at all. Settings that do not affect the localisation of a
+  // frame are ignored. The constructor builds the index of places, which takes about a millisecond per keyframe.
   Localiser(camera::Rig rig, const Config& config, map::BundledMap map, place::VocabularyPtr vocabulary,
             std::vector<image::Image> masks = {});
 
@@ -39,11 +39,11 @@ class Localiser {
   const map::BundledMap& map() const { return *map_; }
 
  private:
-  const camera::Rig run_rig_;  // as given
+  const camera::Rig run_rig_;  // rig of the run, as given
   const Config config_;
   const CamerasOfRun cameras_;  // in rig_
   const map::MapSnapshot map_;
-  const camera::Rig rig_;                  // of the map, with the calibration that was given
+  const camera::Rig rig_;                  // rig of the map, with the given calibration
   const std::vector<image::Image> masks_;  // per camera of the map
   const std::shared_ptr<looping::PlaceRecogniser> places_;
   mutable KeyframeMaker keyframe_maker_;  // unused: no keyframes are created

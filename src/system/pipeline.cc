@@ -20,8 +20,8 @@ std::vector<tracking::CameraEvidence> evidence(const image::ImageBundle& images,
   std::vector<tracking::CameraEvidence> out;
   const tracking::FrameRecord& record = outcome.record;
   for (std::size_t c = 0; c < images.images.size(); ++c) {
-    // Features of a keyframe that was created of an earlier frame, if the camera had an image then, tell more than the
-    // landmarks that were searched for directly.
+    // If a keyframe was created from an earlier frame in which the camera had an image, its features are better
+    // evidence than the landmarks that direct tracking searched for.
     const bool of_keyframe = c < outcome.created_cameras.size() && outcome.created_cameras[c].keypoints > 0;
     const tracking::CameraCounts& counts = of_keyframe ? outcome.created_cameras[c] : record.result.cameras[c];
     out.push_back({.image = images.images[c].state,
@@ -145,7 +145,7 @@ tracking::TrackOutcome Pipeline::track_with_corrected_rig(const image::ImageBund
   return again;
 }
 
-// Passes the images of a frame that was tracked directly on, so that a keyframe is created of it.
+// Passes a frame that was tracked directly and its images to the keyframe maker, which creates a keyframe from it.
 FrameId Pipeline::defer_keyframe(const tracking::FramePlan& plan, BundledFrame frame,
                                  const tracking::TrackOutcome& found) {
   const FrameId id = frame.id;
@@ -163,7 +163,7 @@ std::optional<tracking::CreatedKeyframe> Pipeline::adopt_keyframe(Outcome& outco
   return created;
 }
 
-// Continues with the rig of the map. Returns whether a stage has replaced it since the last frame.
+// Continues with the rig of the map. Returns true if a stage has replaced it since the last frame.
 bool Pipeline::adopt_rig(const map::BundledMap& map, BundledFrame& frame) {
   if (map.shared_rig() == rig_) return false;
   if (frame::changes_frames(*rig_, map.rig())) frame = frame::recalibrated(std::move(frame), *rig_, map.rig());

@@ -21,7 +21,7 @@ using tracking::StageTime;
 class Pipeline {
  public:
   // `rig`, `config` and `keyframe_maker` must outlive the pipeline. Without a relocaliser a lost rig is only searched
-  // for near its last pose. `cameras`: those of the rig that have images.
+  // for near its last pose. `cameras`: the cameras of the rig that are used in this run.
   Pipeline(const camera::Rig& rig, CamerasOfRun cameras, const Config& config, std::vector<image::Image> masks,
            std::unique_ptr<tracking::Relocaliser> relocaliser, KeyframeMaker& keyframe_maker);
 
@@ -33,7 +33,7 @@ class Pipeline {
     std::optional<FrameId>
         deferred;  // the frame was passed to the keyframe maker; the caller enqueues it for its stage
     std::vector<tracking::CameraCounts>
-        created_cameras;                                // of the features of FrameRecord::created, per camera; or empty
+        created_cameras;  // per camera: feature counts of the keyframe in FrameRecord::created; empty without one
     bool started_submap = false;                        // the first of `keyframes` is the root of a new submap
     std::vector<tracking::BetweenKeyframes> early;      // frames of a monocular initialisation, including the first
     std::vector<tracking::ObservedKeypoints> observed;  // per camera
@@ -46,14 +46,14 @@ class Pipeline {
   // Resets tracking; the next frames initialise another map.
   void restart() { state_ = state_.restarted(); }
 
-  // Level of the work per frame, from 0 (all of it) to kMaxReduction, from the next frame on.
+  // Sets the level of reduced work, from 0 (no reduction) to kMaxReduction, from the next frame on.
   void set_reduction(int level);
   int reduction() const { return state_.reduction; }
 
   tracking::TrackStatus status() const { return state_.track.status; }
   const tracking::Tracker& tracker() const { return tracker_; }
 
-  // Of the pyramids of the last frame, and of the index of places of its relocaliser.
+  // Memory of the image pyramids of the last frame, and of the relocaliser's index of keyframes, in bytes.
   std::size_t pyramid_bytes() const { return builder_.memory_bytes(); }
   std::size_t place_index_bytes() const { return tracker_.place_index_bytes(); }
 
@@ -71,8 +71,8 @@ class Pipeline {
                                                   Outcome& outcome);
   void commit(tracking::TrackOutcome& tracked, execution::StageExecutor& executor, Outcome& outcome);
 
-  const camera::Rig given_;                 // its time offsets are included in the capture times of the images
-  std::shared_ptr<const camera::Rig> rig_;  // of the map that the last frame saw
+  const camera::Rig given_;  // the rig as given; its time offsets are included in the capture times of the images
+  std::shared_ptr<const camera::Rig> rig_;  // rig of the map in which the last frame was tracked
   const Config& config_;
   ThreadPool pool_;
   tracking::CameraMonitor monitor_;

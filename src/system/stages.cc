@@ -6,7 +6,7 @@
 namespace bslam::system {
 namespace {
 
-// `rig_prior`: of the given calibration if it is to be compared with the images of the map, else null.
+// `rig_prior`: information of the given calibration if it is to be compared with the images of the map, otherwise null.
 execution::StageResult map_keyframe(const Config& config, const std::shared_ptr<const Eigen::MatrixXd>& rig_prior,
                                     const execution::StageTask& task, const map::MapSnapshot& base,
                                     std::stop_token stop) {
@@ -35,9 +35,9 @@ std::shared_ptr<const Eigen::MatrixXd> rig_prior(const calibration::CalibrationO
   return std::make_shared<const Eigen::MatrixXd>(calibration::prior_information(calibrated, options));
 }
 
-// Whether a calibration that is due can be left out: images that contradict the calibration do so in the first
-// estimates already, so that every other one suffices after these while they agree with it. A map that was loaded, or
-// whose scale had to be estimated, may have had none.
+// Returns true if a calibration that is due can be skipped. Images that contradict the calibration already do so in the
+// first estimates. If the first ones agree with it, every second one of the following is sufficient. A map that was
+// loaded, or whose scale had to be estimated, may have had no estimate yet.
 bool left_out(const calibration::CalibrationOptions& options, const map::BundledMap& map, const camera::Rig& calibrated,
               KeyframeId first, KeyframeId keyframe) {
   if (options.refine == calibration::Refine::kTrue || calibration::replaced(map.rig(), calibrated)) return false;

@@ -18,7 +18,7 @@ struct LoopRecord {
   TimeNs time_ns = 0, with_time_ns = 0;  // times of the two keyframes
 };
 
-// Called for every loop closure that was committed, in the committing thread.
+// Called for every committed loop closure, in the committing thread.
 using LoopObserver = std::function<void(const LoopRecord&)>;
 
 // Returns null if no loops are closed: without a vocabulary, or if the settings say so.

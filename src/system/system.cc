@@ -13,9 +13,10 @@ namespace bslam::system {
 namespace {
 
 // Maximum number of keyframes of a map without metric scale that is discarded if tracking is lost, and of a map that is
-// discarded if the cameras that tell its scale contradict it.
+// discarded if the cameras that determine its scale contradict it.
 constexpr std::size_t kMaxFailedMap = 4, kMaxContradictedMap = 8;
-constexpr int kMaxContradictions = 3;  // number of such maps after which the cameras themselves are taken to be wrong
+// After this number of such maps the contradicting cameras are assumed to be wrong instead.
+constexpr int kMaxContradictions = 3;
 
 // Returns true if the frame is lost although it has features: the map may be wrong.
 bool disowns_map(const tracking::TrackResult& result) {
@@ -174,7 +175,7 @@ void System::note(const tracking::CreatedKeyframe& created, TimeNs time_ns) {
   created_.push_back(created);
 }
 
-// Marks the frames of which keyframes were created since the last call; they have the poses of these from then on.
+// Marks the frames from which keyframes were created since the last call. Their poses become those of the keyframes.
 void System::mark_created_keyframes() {
   std::vector<tracking::CreatedKeyframe> all;
   {
@@ -191,8 +192,8 @@ void System::mark_created_keyframes() {
   }
 }
 
-// Returns true if only cameras that overlap with no other one agree with the map, and others contradict it. Cameras
-// without overlap agree with a wrong scale as well as with the right one: they must not outvote those that tell it.
+// Returns true if the cameras that overlap with others contradict the map, and only cameras without overlap agree with
+// it. Cameras without overlap are consistent with any scale, so that they must not outvote those that determine it.
 bool System::scale_contradicted(const tracking::TrackResult& result) const {
   if (result.status != tracking::TrackStatus::kTracking) return false;
   bool contradicted = false;
@@ -205,7 +206,7 @@ bool System::scale_contradicted(const tracking::TrackResult& result) const {
 }
 
 // Returns true if a recent initialisation was wrong: the frames after a monocular one are lost, or the cameras that
-// tell the scale contradict a metric one, as if they saw mostly an object that moved.
+// determine the scale contradict a metric one, which happens if most of their points were on a moving object.
 bool System::initialisation_failed(const Pipeline::Outcome& outcome, bool had_pose) const {
   if (!had_pose || loaded_) return false;
   const map::BundledMap& seen = *outcome.seen;

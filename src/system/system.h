@@ -31,17 +31,17 @@ struct StageRecord {
 // Optional input of a run.
 struct Resources {
   std::vector<image::Image> masks = {};  // one per camera of the rig, empty if it has no mask; or no masks at all
-  place::VocabularyPtr vocabulary = {};  // null: no place is recognised
-  // Map of an earlier run with this rig or any other one. The run continues in it after relocalisation. A rig that is
-  // new to the map keeps the given calibration, which is not estimated then; that of a known one is in the map, and may
-  // have been refined (map/rigs_of_map.h).
+  place::VocabularyPtr vocabulary = {};  // null: no place recognition
+  // Map of an earlier run with this or any other rig. The run continues in it after relocalisation. If the map already
+  // has this rig, the run uses the calibration in the map, which may have been refined (map/rigs_of_map.h). Otherwise
+  // it uses the given calibration and does not refine it.
   std::optional<map::BundledMap> map = {};
-  // Calibration with which the map begins, such as the estimate of an earlier run; nullopt: that of the rig, which is
-  // the prior of the calibration in either case. Not used with `map`, which has its own.
+  // Initial calibration of a new map, such as the estimate of an earlier run; nullopt: that of the given rig. The given
+  // rig is the prior of the refinement in either case. Not used with `map`, which contains a calibration.
   std::optional<camera::Rig> initial_rig = {};
   std::optional<execution::Journal> replay = {};  // repeats the run of this journal, regardless of the mode
-  // Minimum number of last frames and stage runs whose records are kept, for runs of unlimited duration; no journal is
-  // kept then. 0: all records and the journal are kept.
+  // Minimum number of latest frames and stage runs whose records are kept, for runs of unlimited duration; the journal
+  // is not kept then. 0: all records and the journal are kept.
   std::size_t history = 0;
 };
 
@@ -55,8 +55,8 @@ struct SubmapTrajectory {
 // The memory that a system holds, in bytes.
 struct SystemMemory {
   map::MapMemory map;           // the newest version
-  std::size_t place_index = 0;  // of loop closing and relocalisation
-  std::size_t pyramids = 0;     // of the last frames and their masks
+  std::size_t place_index = 0;  // keyframe indices of loop closing and relocalisation
+  std::size_t pyramids = 0;     // image pyramids of the last frames and their masks
 };
 
 class System {
@@ -71,8 +71,8 @@ class System {
   // exceptions of workers.
   Result<FrameRecord> process(const image::ImageBundle& images);
 
-  // Level of the work per frame, from 0 (all of it) to kMaxReduction (tracking/reduced_work.h), from the next
-  // frame on. It is part of the journal. To be called from the thread that calls process().
+  // Sets the level of reduced work, from 0 (no reduction) to kMaxReduction (tracking/reduced_work.h), from the next
+  // frame on. The journal records it. Must be called from the thread that calls process().
   void set_reduction(int level);
 
   // Waits for the stages and, if configured, adjusts the whole map. Must be called once, after the last frame.
@@ -88,13 +88,13 @@ class System {
   KeyframeId first_keyframe() const { return first_keyframe_; }
   // Index in the rig of the map of the first camera of the run; the others follow in order.
   std::size_t first_camera() const { return cameras_.first; }
-  // The rig of the run with its present calibration, that of the map.
+  // The rig of the run with the current calibration of the map.
   camera::Rig rig() const;
-  // The last frames in order: all of the run, or at least Resources::history of them. Valid until the next
+  // The latest frames in order: all frames of the run, or at least Resources::history of them. Valid until the next
   // process().
   const std::vector<FrameRecord>& frames() const { return frames_; }
-  // Frames of which a keyframe was created after they were tracked, as the last call of process() or finish() has
-  // learnt. The frame of that call may be among them.
+  // Frames that became keyframes in the background after they had been tracked, as found out by the last call of
+  // process() or finish(). The frame of that call may be among them.
   const std::vector<FrameRecord>& created_keyframes() const { return created_keyframes_; }
   // The keypoints of the last frame, per camera. Moves them out: they are empty until the next process().
   std::vector<tracking::ObservedKeypoints> take_observed_keypoints() { return std::exchange(observed_, {}); }
@@ -120,8 +120,8 @@ class System {
   // Poses of all frames() that have one, in the current map: one trajectory for each submap with poses, the longest
   // first.
   std::vector<SubmapTrajectory> trajectories() const;
-  // Uncorrected poses, as returned by process(), in the submaps of that time; the one of the longest final trajectory
-  // first.
+  // Uncorrected poses as returned by process(), one trajectory per submap of that time. The submap with the longest
+  // final trajectory is first.
   std::vector<SubmapTrajectory> live_trajectories() const;
 
  private:
@@ -137,14 +137,14 @@ class System {
   TimeNs time_of(const execution::StageTask& task);
   void set_keyframe_time(KeyframeId k, TimeNs time_ns);
 
-  const CamerasOfRun cameras_;  // in rig_
-  const camera::Rig rig_;       // of the map, with the calibration that was given
-  const camera::Rig run_rig_;   // as given
+  const CamerasOfRun cameras_;  // indices in rig_
+  const camera::Rig rig_;       // rig of the map, with the given calibration
+  const camera::Rig run_rig_;   // rig of the run, as given
   const Config config_;
   const bool loaded_;                                  // whether the run began with a loaded map
   const KeyframeId first_keyframe_;                    // first keyframe of this run
-  KeyframeId first_of_map_;                            // after the last map that was withdrawn
-  int contradictions_ = 0;                             // number of metric maps that were withdrawn
+  KeyframeId first_of_map_;                            // first keyframe after the last discarded map
+  int contradictions_ = 0;                             // number of discarded metric maps
   const std::shared_ptr<looping::LoopCloser> closer_;  // null: no loops are closed
   KeyframeMaker keyframe_maker_;
   Pipeline pipeline_;
@@ -158,8 +158,8 @@ class System {
   std::vector<StageRecord> stage_runs_;  // this and the next four members are guarded by records_mutex_
   std::vector<LoopRecord> loops_;
   std::vector<TimeNs> keyframe_time_ns_;            // by KeyframeId
-  std::map<FrameId, TimeNs> deferred_time_ns_;      // of frames of which keyframes are being created
-  std::vector<tracking::CreatedKeyframe> created_;  // whose frames are not marked yet
+  std::map<FrameId, TimeNs> deferred_time_ns_;      // frames from which keyframes are being created
+  std::vector<tracking::CreatedKeyframe> created_;  // keyframes whose frame records are not marked yet
   double final_adjustment_ms_ = 0, calibration_ms_ = 0;
   adjustment::AdjustmentReport final_adjustment_;
   calibration::RigRefinement calibration_;
@@ -167,7 +167,7 @@ class System {
   int maps_started_ = 0;
   std::stop_source interruption_;
   map::MapStore store_;
-  const std::shared_ptr<const camera::Rig> initial_rig_;  // of the map at the beginning
+  const std::shared_ptr<const camera::Rig> initial_rig_;  // rig of the map at the beginning of the run
   execution::MapGate gate_;
   std::unique_ptr<execution::StageExecutor> executor_;  // last member, so that its threads are joined first
 };

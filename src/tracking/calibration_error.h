@@ -17,10 +17,11 @@
 namespace bslam::tracking {
 
 // Calibration errors in level-0 pixels per camera, updated with `frame`, which was tracked with `output`. `before`: the
-// errors before this frame (empty: options.calibration_error_px for all cameras). They follow the measurements within
-// about ten frames and are bounded by options.min_calibration_error_px and options.max_calibration_error_px. The error
-// of a camera with few matches does not change. After a lost frame they are at least options.calibration_error_px,
-// because the cause of the loss may persist. Keyframes keep the standard deviations assigned when they were created.
+// errors before this frame (empty: options.calibration_error_px for all cameras). They converge to new measurements
+// within about ten frames and are bounded by options.min_calibration_error_px and options.max_calibration_error_px. The
+// error of a camera with few matches does not change. After a lost frame they are at least
+// options.calibration_error_px, because the cause of the loss may persist. Keyframes keep the standard deviations
+// assigned when they were created.
 std::vector<double> calibration_errors(std::span<const double> before, const map::BundledMap& map,
                                        const frame::BundledFrame& frame, const TrackOutput& output,
                                        const matching::AlignmentOptions& options);

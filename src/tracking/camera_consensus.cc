@@ -96,7 +96,7 @@ std::vector<std::uint8_t> conflicting_cameras(const std::vector<LandmarkCounts>&
 std::vector<std::uint8_t> contradicting_cameras(const std::vector<LandmarkCounts>& agreeing,
                                                 const std::vector<CameraConsensusState>& states,
                                                 const ConsensusOptions& options) {
-  constexpr double kClearlyLess = 0.5;  // of the largest inlier ratio
+  constexpr double kClearlyLess = 0.5;  // fraction of the largest inlier ratio
   std::vector<std::uint8_t> out = conflicting_cameras(agreeing, states, options);
   double best = 0;
   for (const LandmarkCounts& camera : agreeing) {

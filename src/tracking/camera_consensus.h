@@ -14,9 +14,10 @@ struct CameraConsensusState {
   bool excluded = false;      // its images are not used
   bool established = false;   // has found `min_expected` landmarks in some frame; required to exclude it for conflicts
   int consistent_frames = 0;  // consecutive frames in which an excluded camera was consistent with the map
-  TimeNs last_judged_ns = 0;  // when an excluded camera last had enough landmarks in view to be checked
-  TimeNs excluded_since_ns = 0;       // start of the exclusion, or when its view was last found to be displaced
-  double reobservation_ratio = 1.0;   // in the last frame with enough expected landmarks, or of those aligned directly
+  TimeNs last_judged_ns = 0;  // time at which an excluded camera last had enough landmarks in view to be checked
+  TimeNs excluded_since_ns = 0;  // time of the exclusion, or time at which its view was last found to be displaced
+  // Ratio in the last frame with enough expected landmarks; in direct tracking, of the aligned landmarks.
+  double reobservation_ratio = 1.0;
   TimeNs last_image_ns = 0;           // time of its last image that was used
   std::vector<LandmarkId> landmarks;  // inliers of that image
 };
@@ -43,9 +44,9 @@ std::vector<LandmarkCounts> count_reobserved(const map::BundledMap& map, const f
                                              const std::vector<CameraConsensusState>& states,
                                              const FrameMatches& found);
 
-// Per camera: how many of its matches tell whether it agrees with a pose, and how many of these do. `inlier`: of the
-// matches, in order. A landmark that a camera without conflict finds elsewhere too has moved by itself; that it is an
-// outlier of a camera that few matches agree with does not count.
+// Per camera: the number of matches that are used to judge whether the camera agrees with a pose, and how many of them
+// are inliers. `inlier`: one flag per match, in order. A landmark that is also an outlier in a camera without conflict
+// has probably moved; it is not counted in cameras with few inliers.
 std::vector<LandmarkCounts> count_agreeing(const FrameMatches& matches, std::span<const std::uint8_t> inlier,
                                            const ConsensusOptions& options);
 
@@ -54,8 +55,8 @@ std::vector<LandmarkCounts> count_agreeing(const FrameMatches& matches, std::spa
 std::vector<std::uint8_t> conflicting_cameras(const std::vector<LandmarkCounts>& agreeing,
                                               const std::vector<CameraConsensusState>& states,
                                               const ConsensusOptions& options);
-// Flags those of the conflicting cameras that agree clearly less with the pose than the best camera does. In a blurred
-// or badly predicted frame all cameras agree little; this is no reason to exclude one.
+// Flags the conflicting cameras whose inlier ratio is clearly lower than that of the best camera. In a blurred or badly
+// predicted frame the ratio is low in all cameras, which is no reason to exclude one.
 std::vector<std::uint8_t> contradicting_cameras(const std::vector<LandmarkCounts>& agreeing,
                                                 const std::vector<CameraConsensusState>& states,
                                                 const ConsensusOptions& options);

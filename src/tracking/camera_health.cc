@@ -157,7 +157,7 @@ void CameraMonitor::admit_if_none_is_left(const Health& images, std::vector<Came
     found[c] = cameras_[c].outage = CameraReason::kNone;
   }
   if (any_used()) return;
-  // A large white object may cover the view. What remains of it is better than nothing.
+  // A large white object may cover most of the view. The rest of the image is better than no image.
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
     if (found[c] == CameraReason::kOverExposed && images[c]->shows_something) found[c] = CameraReason::kNone;
   }

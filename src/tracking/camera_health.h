@@ -42,7 +42,7 @@ struct HealthOptions {
   }
 };
 
-// What an image shows of the state of its camera.
+// Properties of an image from which the health of its camera is determined.
 struct ImageHealth {
   CameraReason reason = CameraReason::kNone;  // black or over-exposed
   bool shows_something = true;                // some pixels are neither dark nor bright
@@ -52,7 +52,7 @@ struct ImageHealth {
 
 // Faults found in the images of a frame; one entry per camera.
 struct ImageFaults {
-  std::vector<CameraReason> outage;   // why the camera is not used in this frame; kNone: it is used
+  std::vector<CameraReason> outage;   // reason why the camera is not used in this frame; kNone: it is used
   std::vector<std::uint8_t> blurred;  // out of focus or smeared, but used
   std::vector<std::uint8_t> failing;  // not used; false if only an image is missing, as between images of a slow camera
 };
@@ -67,11 +67,11 @@ class CameraMonitor {
  private:
   using Health = std::vector<std::optional<ImageHealth>>;  // per camera; nullopt: it has no image
 
-  // Per camera, why it is not used in this frame. An image is frozen if it is identical to the previous image of
-  // its camera while the image of another camera has changed; frozen images are thus not detected with a single camera
-  // or if all images are identical. A camera without an image is not used in that frame, and used again with its next
-  // image. If all other cameras are out as well, a camera with a good image is used immediately; if there is none,
-  // those are used whose image is over-exposed in part.
+  // Per camera, why it is not used in this frame. An image is frozen if it is identical to the previous image of its
+  // camera while the image of another camera has changed; frozen images are thus not detected with a single camera or
+  // if all images are identical. A camera without an image is not used in that frame, and used again with its next
+  // image. If all other cameras are out as well, a camera with a good image is used immediately. If no image is good,
+  // the cameras whose images are only partly over-exposed are used.
   std::vector<CameraReason> find_outages(const Health& images);
   void admit_if_none_is_left(const Health& images, std::vector<CameraReason>& found);
   // Per camera: whether it is out of focus or smeared, determined from the slope of the edges in its image. Rows and

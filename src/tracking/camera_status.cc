@@ -16,7 +16,7 @@ constexpr double kHealthyInlierRatio = 0.1, kMaxInconsistentInlierRatio = 0.02;
 constexpr double kMinKeypoints = 1000;
 constexpr int kMinFrames = 10;
 
-// Whether the number of keypoints tells something about the image.
+// Returns true if the number of keypoints is meaningful for the image.
 bool counts_features(const CameraEvidence& e) {
   return e.extracted && e.image == image::ImageState::kPresent && e.outage == CameraReason::kNone && !e.inconsistent &&
          !e.postponed;

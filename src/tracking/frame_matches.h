@@ -20,7 +20,7 @@ namespace bslam::tracking {
 struct Match {
   KeypointIndex keypoint;
   LandmarkId landmark;
-  bool aligned = false;  // to the landmark's reference patch
+  bool aligned = false;  // aligned to the landmark's reference patch
 };
 
 // Per camera, in order of keypoint. A keypoint has at most one match, a landmark at most one per camera.

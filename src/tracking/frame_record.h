@@ -22,7 +22,7 @@ struct Relocalisation {
   int inliers = 0;  // keypoints
 };
 
-// A keyframe that was created of an earlier frame after that had been processed.
+// A keyframe that was created in the background from an earlier frame, after that frame had been processed.
 struct CreatedKeyframe {
   FrameId frame;
   KeyframeId keyframe;
@@ -30,7 +30,7 @@ struct CreatedKeyframe {
 };
 
 struct FrameRecord {
-  TrackResult result;  // as returned when the frame was processed
+  TrackResult result;  // result returned when the frame was processed
   // The result found at the end of the run for a frame that had no pose when it was processed; else null.
   std::shared_ptr<const TrackResult> found_later;
   std::vector<image::ImageState> images;  // per camera
@@ -43,14 +43,15 @@ struct FrameRecord {
   // T_map_odom only. The odometry pose does not change while the rig is lost. T_rig_odom = T_rig_world * T_map_odom,
   // with T_rig_world of `result`.
   geometry::SE3 T_rig_odom, T_map_odom;
-  KeyframeId root;                         // root keyframe of the submap in which `result` gives the pose
-  map::Scale scale = map::Scale::kMetric;  // of the map in which it gives the pose
+  KeyframeId root;                         // root keyframe of the submap in whose world frame `result` gives the pose
+  map::Scale scale = map::Scale::kMetric;  // scale of the map in which `result` gives the pose
   bool keyframe = false;
-  std::optional<CreatedKeyframe> created;      // a keyframe that tracking used for the first time in this frame
-  bool direct = false;                         // the pose was found by direct tracking
-  int reduction = 0;                           // level of reduced work (tracking/reduced_work.h)
-  bool recalibrated = false;                   // the calibration of the rig differs from that of the previous frame
-  bool map_withdrawn = false;                  // after this frame the map was emptied, because it was not a good start
+  // Keyframe created in the background, used by tracking for the first time in this frame.
+  std::optional<CreatedKeyframe> created;
+  bool direct = false;         // the pose was found by direct tracking
+  int reduction = 0;           // level of reduced work (tracking/reduced_work.h)
+  bool recalibrated = false;   // the calibration of the rig differs from that of the previous frame
+  bool map_withdrawn = false;  // the map was discarded after this frame, because its initialisation was wrong
   int unique = 0, monocular = 0, matched = 0;  // features; unique = monocular + matched
 
   std::vector<StageTime> stages;  // in the caller's thread

@@ -1,4 +1,4 @@
-// The grid by which tracking judges how far matches spread over an image.
+// The grid with which tracking measures how widely matches are spread over an image.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,7 +9,7 @@
 
 namespace bslam::tracking {
 
-constexpr int kCells = 8;  // per side
+constexpr int kCells = 8;  // number of cells per side
 
 inline std::size_t cell_of(const Eigen::Vector2d& pixel, const camera::Camera& camera) {
   const auto along = [](double position, int size) {

@@ -74,8 +74,8 @@ struct Unit {
   double deviation = std::numeric_limits<double>::infinity();
 };
 
-// The length of the motion of a camera from which on the rotation of the rig moves the other cameras only as far apart
-// from it as cannot be noticed.
+// Returns the length of the motion of a camera above which the rotation of the rig changes the direction of motion of
+// the other cameras by less than can be measured.
 double least_length(const TwoView& view, const camera::Rig& rig) {
   constexpr double kUnnoticed = 0.01;  // rad, change of the direction of motion
   const Eigen::Matrix3d turn = view.pose.T_b_a.matrix3() - Eigen::Matrix3d::Identity();
@@ -87,8 +87,9 @@ double least_length(const TwoView& view, const camera::Rig& rig) {
   return apart / kUnnoticed;
 }
 
-// If the scale cannot be estimated well, the images do not show how the other cameras move relative to this one. A map
-// that is too small would claim that they do, and accept the matches of the other cameras that happen to agree with it.
+// If the scale cannot be estimated well, it must not be chosen too small: in a small map the rotation of the rig moves
+// the other cameras in clearly different directions, and their wrong matches that happen to agree with these directions
+// would be accepted.
 Unit choose_unit(const TwoView& view, const FramePairs& pairs, const camera::Rig& rig,
                  const InitialisationOptions& options) {
   std::vector<double> depths;

@@ -15,11 +15,12 @@ namespace {
 constexpr int kMinTrackedClose = 100, kMinUntrackedClose = 70;
 constexpr double kRestMaxParallax = 0.01;  // rad; a rig at rest has a smaller parallax
 constexpr double kRestMinOverlap = 0.95;
-constexpr std::size_t kMinLandmarks = 100;  // tracked: with fewer, the place may have changed since
-constexpr double kMinShared = 0.6;          // of the inliers, with a similar keyframe
-constexpr std::size_t kNewest = 5;          // number of keyframes that the rig has not left yet
-constexpr double kSimilarParallax = 0.5;    // maximum parallax to it, relative to that of a new keyframe
-constexpr int kFewInliersInterval = 8;  // minimum number of frames between keyframes due to a camera with few inliers
+// Minimum number of tracked landmarks; with fewer, the scene may have changed.
+constexpr std::size_t kMinLandmarks = 100;
+constexpr double kMinShared = 0.6;        // minimum fraction of the inliers that a similar keyframe observes
+constexpr std::size_t kNewest = 5;        // number of newest keyframes that do not count as a return
+constexpr double kSimilarParallax = 0.5;  // maximum parallax to it, relative to that of a new keyframe
+constexpr int kFewInliersInterval = 8;    // minimum number of frames between keyframes due to a camera with few inliers
 
 bool untracked_depth(const frame::BundledFrame& frame, const FrameMatches& inliers,
                      const InitialisationOptions& options) {
@@ -51,8 +52,8 @@ std::vector<double> parallaxes_to(const map::BundledMap& map, const std::vector<
   return out;
 }
 
-// The keyframes that observe most of the landmarks. The reference does not count, nor do the newest ones: a rig that is
-// still near them has not come back.
+// The keyframes that observe most of the landmarks, without the reference and the newest keyframes: a rig that is still
+// near them has not returned.
 std::vector<KeyframeId> keyframes_that_share(const map::BundledMap& map, const std::vector<LandmarkId>& landmarks,
                                              KeyframeId reference) {
   std::vector<KeyframeId> out;

@@ -15,11 +15,12 @@ struct KeyframeEvidence {
   int best_overlap = 0;  // maximum overlap of a frame since the keyframe
   double parallax = 0;   // rad, median angle at these landmarks between the rays to the reference and to this frame
   bool camera_with_few_inliers = false;  // some camera with keypoints has too few inliers
-  // Few features with accurate depth are tracked and many are not: a keyframe creates new metric landmarks.
+  // Few features with accurate depth are tracked, and many are not yet landmarks: a keyframe would create new metric
+  // landmarks.
   bool untracked_depth = false;
 };
 
-// Everything but the frame counts and the best overlap. `inliers`: matches of `frame` at `T_rig_world`.
+// Computes all members except the frame counts and the best overlap. `inliers`: matches of `frame` at `T_rig_world`.
 KeyframeEvidence keyframe_evidence(const map::BundledMap& map, const frame::BundledFrame& frame,
                                    const FrameMatches& inliers, KeyframeId reference, const geometry::SE3& T_rig_world,
                                    const TrackingOptions& options);
@@ -29,9 +30,9 @@ std::vector<int> overlap_by_camera(const map::BundledMap& map, const FrameMatche
 
 bool keyframe_due(const KeyframeEvidence& evidence, const KeyframeOptions& options);
 
-// The keyframe with the smallest parallax among those that show the same as the frame from nearby: it observes most of
-// the inliers, enough of its landmarks are in view, and the parallax to it is small. A frame that is due needs no
-// keyframe of its own then: the rig is back where it was.
+// Returns the keyframe with the smallest parallax among those that are similar to the frame: they observe most of the
+// inliers, enough of their landmarks are in view, and the parallax to them is small. If there is one, the rig has
+// returned to its position, and the frame need not become a keyframe.
 std::optional<KeyframeId> similar_keyframe(const map::BundledMap& map, const frame::BundledFrame& frame,
                                            const FrameMatches& inliers, KeyframeId reference,
                                            const geometry::SE3& T_rig_world, const KeyframeOptions& options);

@@ -30,7 +30,7 @@ bool has_camera(const std::vector<KeypointRef>& group, CameraIndex camera) {
 
 struct Groups {
   std::vector<std::vector<KeypointRef>> matched;  // two or more keypoints
-  std::vector<LandmarkId> landmark;               // of each, invalid = none
+  std::vector<LandmarkId> landmark;               // landmark of each; invalid: none
 };
 
 using KeypointsByLandmark = std::map<LandmarkId, std::vector<KeypointRef>>;

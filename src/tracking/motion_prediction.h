@@ -16,8 +16,8 @@ geometry::SE3 last_pose(const TrackInput& input);
 geometry::SE3 predict(const TrackInput& input, TimeNs time_ns);
 
 // Motion during the capture of a frame: the motion since the last frame, extrapolated with its acceleration with
-// respect to the interval before. It is a function of the poses. It must not be estimated from the late cameras: the
-// landmarks they re-observe were first observed with the same error.
+// respect to the interval before. It is a function of the poses. It must not be estimated as a free variable from
+// cameras with other capture times: the landmarks that they re-observe were created with the same error of the motion.
 solver::MotionModel motion_model(const TrackInput& input, const frame::BundledFrame& frame);
 
 }  // namespace bslam::tracking

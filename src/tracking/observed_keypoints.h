@@ -13,8 +13,8 @@ namespace bslam::tracking {
 // The keypoints of one camera. In a frame that was tracked directly these are the landmarks that were aligned.
 struct ObservedKeypoints {
   SharedArray<Eigen::Vector2f> pixel;  // raw, distorted image
-  std::vector<Match> matched;          // to landmarks, before outliers were removed; empty if the frame has no pose
-  std::vector<Match> inliers;          // those of them that support the pose
+  std::vector<Match> matched;          // matches to landmarks, including outliers; empty if the frame has no pose
+  std::vector<Match> inliers;          // the matches that support the pose
 };
 
 // One entry per camera. Matches that are missing are empty.

@@ -10,20 +10,22 @@ namespace bslam::tracking {
 
 struct MatchingOptions {
   double predicted_radius = 0.025;  // rad, search radius around the prediction of the motion model
-  double wide_radius = 0.12;        // rad, search radius if that finds too few landmarks, 0.1 s after the last pose
-  double widest_radius = 0.5;       // rad, maximum of the same, which grows in proportion to the time
-  double local_radius = 0.006;      // rad, search radius for landmarks of the local view, at the estimated pose
-  int max_hamming = 80;             // bits, maximum descriptor distance of a match
-  double ratio = 0.9;               // maximum ratio of best to second best descriptor distance on one pyramid level
+  // Rad, radius of the second search if that finds too few landmarks, 0.1 s after the last pose.
+  double wide_radius = 0.12;
+  // Rad, maximum radius of the second search, which grows with the time since the last pose.
+  double widest_radius = 0.5;
+  double local_radius = 0.006;  // rad, search radius for landmarks of the local view, at the estimated pose
+  int max_hamming = 80;         // bits, maximum descriptor distance of a match
+  double ratio = 0.9;           // maximum ratio of best to second best descriptor distance on one pyramid level
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
     visitor("predicted_radius", self.predicted_radius, Range{1e-4, 1}, "rad",
             "search radius around the prediction of the motion model", kCommon);
     visitor("wide_radius", self.wide_radius, Range{1e-4, 1.5}, "rad",
-            "search radius if that finds too few landmarks, up to 0.1 s after the last pose", kCommon);
+            "radius of a second search if the first finds too few landmarks, up to 0.1 s after the last pose", kCommon);
     visitor("widest_radius", self.widest_radius, Range{1e-4, 1.5}, "rad",
-            "maximum of this radius, which grows in proportion to the time after the last pose");
+            "maximum of wide_radius, which grows with the time since the last pose");
     visitor("local_radius", self.local_radius, Range{1e-4, 1}, "rad",
             "search radius for landmarks of the local view, at the estimated pose");
     visitor("max_hamming", self.max_hamming, Range{1, 256}, "bits", "maximum descriptor distance of a match");
@@ -64,14 +66,15 @@ struct KeyframeOptions {
 };
 
 struct InitialisationOptions {
-  int min_matched = 30;               // minimum number of features with an accurate metric point for a metric map
-  double max_depth_error = 0.15;      // maximum relative standard deviation of the depth of a new landmark
-  double min_parallax = 5e-4;         // rad, minimum parallax of a matched feature for which a point is triangulated
-  double max_chi2 = 7.81;             // maximum squared normalised error of a keypoint to its feature's point
-  int min_monocular = 80;             // minimum number of matches for a monocular initialisation
-  int min_monocular_points = 50;      // minimum number of points of a monocular initialisation
-  double assumed_median_depth = 3.0;  // m, least median distance of these points if the scale is too uncertain
-  double max_scale_deviation = 1.0;   // maximum relative standard deviation of the scale estimated from two frames
+  int min_matched = 30;           // minimum number of features with an accurate metric point for a metric map
+  double max_depth_error = 0.15;  // maximum relative standard deviation of the depth of a new landmark
+  double min_parallax = 5e-4;     // rad, minimum parallax of a matched feature for which a point is triangulated
+  double max_chi2 = 7.81;         // maximum squared normalised error of a keypoint to its feature's point
+  int min_monocular = 80;         // minimum number of matches for a monocular initialisation
+  int min_monocular_points = 50;  // minimum number of points of a monocular initialisation
+  // M, minimum median distance of the initial points that is assumed if the scale is too uncertain.
+  double assumed_median_depth = 3.0;
+  double max_scale_deviation = 1.0;  // maximum relative standard deviation of the scale estimated from two frames
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
@@ -79,7 +82,8 @@ struct InitialisationOptions {
             "minimum number of features with an accurate metric point to initialise a metric map", kCommon);
     visitor("max_depth_error", self.max_depth_error, Range{0.001, 10}, "",
             "maximum relative standard deviation of the depth of a new landmark");
-    visitor("min_parallax", self.min_parallax, Range{0, 1}, "rad", "minimum parallax of a feature with a point");
+    visitor("min_parallax", self.min_parallax, Range{0, 1}, "rad",
+            "minimum parallax of a matched feature to triangulate its point");
     visitor("max_chi2", self.max_chi2, Range{0.1, 1000}, "",
             "maximum squared normalised error of a keypoint to its feature's point");
     visitor("min_monocular", self.min_monocular, Range{10, 10000}, "",
@@ -87,7 +91,7 @@ struct InitialisationOptions {
     visitor("min_monocular_points", self.min_monocular_points, Range{10, 10000}, "",
             "minimum number of points of a monocular initialisation");
     visitor("assumed_median_depth", self.assumed_median_depth, Range{1e-3, 1e4}, "m",
-            "assumed median distance of these points if the scale of a rig is too uncertain",
+            "median distance of the initial points that is assumed if the scale of a rig is too uncertain",
             OptionNote{.formerly = "guessed_depth"});
     visitor("max_scale_deviation", self.max_scale_deviation, Range{1e-3, 10}, "",
             "maximum relative standard deviation of the scale estimated at the initialisation");
@@ -107,7 +111,7 @@ struct ConsensusOptions {
   double previous_reobservation_ratio = 0.5;
   double conflict_inlier_ratio = 0.3;  // minimum inlier ratio of a camera's matches; with fewer it contradicts the pose
   double readmission_ratio = 0.15;     // minimum fraction of the landmarks in view that an excluded camera must match
-  int readmit_after = 3;               // consecutive such frames until it is used again
+  int readmit_after = 3;               // number of consecutive frames with this fraction until the camera is used again
   double forget_after_s = 2.0;         // an excluded camera with too few landmarks in view for this time is used again
   double retry_after_s = 10.0;         // time after which an excluded camera is used again unless its view is displaced
 
@@ -119,10 +123,11 @@ struct ConsensusOptions {
             "minimum fraction of the landmarks of the last frame that a camera must re-observe",
             OptionNote{.formerly = "lost_share"});
     visitor("healthy_reobservation_ratio", self.healthy_reobservation_ratio, Range{0, 1}, "",
-            "fraction that another camera must re-observe to exclude it; minimum inlier ratio of a single-camera pose",
+            "a camera is excluded only if another one re-observes this fraction; minimum inlier ratio of a "
+            "single-camera pose",
             OptionNote{.formerly = "sound_share"});
     visitor("previous_reobservation_ratio", self.previous_reobservation_ratio, Range{0, 1}, "",
-            "fraction that it must have re-observed in the previous frame to be excluded",
+            "a camera is excluded only if it re-observed this fraction in the previous frame",
             OptionNote{.formerly = "steady_share"});
     visitor("conflict_inlier_ratio", self.conflict_inlier_ratio, Range{0, 1}, "",
             "minimum inlier ratio of a camera's matches that does not contradict the pose",
@@ -131,7 +136,7 @@ struct ConsensusOptions {
             "minimum fraction of the landmarks in view that an excluded camera must match",
             OptionNote{.formerly = "seen_share"});
     visitor("readmit_after", self.readmit_after, Range{1, 10000}, "frames",
-            "consecutive such frames until an excluded camera is used again");
+            "consecutive frames above readmission_ratio until an excluded camera is used again");
     visitor("forget_after_s", self.forget_after_s, Range{0, 1e6}, "s",
             "time without enough landmarks in view after which an excluded camera is used again");
     visitor("retry_after_s", self.retry_after_s, Range{0, 1e6}, "s",
@@ -143,17 +148,21 @@ struct ConsensusOptions {
 enum class FrontEnd {
   kFeatures,  // from extracted features, in every frame
   kDirect,    // from landmarks aligned directly in the images; from features where this does not suffice
-  kAuto,      // as kDirect, with pauses while the alignment fails
+  kAuto,      // like kDirect, but with features for some frames after the alignment has failed repeatedly
 };
 
 // Direct tracking (tracking/track_directly.h).
 struct DirectOptions {
   int per_image = 300;  // maximum number of landmarks aligned in an image
-  int per_rig = 600;    // the same in all images of a frame, but at least `min_per_image` in each
+  // Maximum number of landmarks aligned in all images of a frame, but at least `min_per_image` in each.
+  int per_rig = 600;
   int min_per_image = 100;
-  int coarse_per_image = 60;  // landmarks of the coarsest levels that are aligned first; fewer if cameras share per_rig
-  double coarse_shift_px = 4;  // px of the level, maximum distance of these from their predicted positions
-  // As KeyframeOptions::min_overlap. Landmarks are aligned from farther away than they are detected again.
+  // Number of landmarks with coarse patches that are aligned first; fewer if per_rig limits each image.
+  int coarse_per_image = 60;
+  // Pixels of the pyramid level, maximum distance of these landmarks from their predicted positions.
+  double coarse_shift_px = 4;
+  // KeyframeOptions::min_overlap for frames without features. It is larger because landmarks can still be aligned when
+  // the rig is too far away to detect them again.
   double min_overlap = 0.85;
   // Features are extracted if a camera has fewer inliers than this fraction of its largest number since the last
   // extraction.
@@ -163,15 +172,15 @@ struct DirectOptions {
   static void visit(Self& self, Visitor& visitor) {
     visitor("per_image", self.per_image, Range{50, 20000}, "", "maximum number of landmarks aligned in an image");
     visitor("per_rig", self.per_rig, Range{50, 100000}, "",
-            "maximum number of landmarks aligned in all images of a frame, but for min_per_image");
+            "maximum number of landmarks aligned in all images of a frame; min_per_image takes precedence");
     visitor("min_per_image", self.min_per_image, Range{10, 20000}, "",
-            "number of landmarks aligned in an image however many cameras there are");
+            "minimum of the landmarks aligned in an image, if per_rig is divided among many cameras");
     visitor("coarse_per_image", self.coarse_per_image, Range{10, 1000}, "",
-            "number of landmarks of coarse pyramid levels that are aligned first, fewer if the images share per_rig");
+            "number of landmarks with coarse patches that are aligned first; fewer if per_rig limits each image");
     visitor("coarse_shift_px", self.coarse_shift_px, Range{0.5, 20}, "px of the level",
-            "maximum distance of these from their predicted positions");
+            "maximum distance of the landmarks that are aligned first from their predicted positions");
     visitor("min_overlap", self.min_overlap, Range{0, 1}, "",
-            "as tracking.keyframe.min_overlap, for frames without features");
+            "tracking.keyframe.min_overlap for frames without features");
     visitor("min_support", self.min_support, Range{0, 1}, "",
             "features are extracted if a camera has fewer inliers than this fraction of its largest number since the "
             "last extraction");
@@ -182,7 +191,7 @@ struct TrackingOptions {
   FrontEnd frontend = FrontEnd::kAuto;
   bool use_capture_times = true;  // the cameras of a frame have their own capture times; false: the time of the frame
   int min_inliers = 30;           // minimum number of inlier keypoints of a pose, all cameras together
-  int min_inliers_wide = 50;      // the same after a search in wide windows
+  int min_inliers_wide = 50;      // minimum number of inlier keypoints of a pose after a search in wide windows
   double min_inlier_ratio = 0.3;  // minimum ratio of inliers to matches of a pose, lower above 100 inliers
   MatchingOptions matching;
   ConsensusOptions consensus;
@@ -197,7 +206,7 @@ struct TrackingOptions {
   static void visit(Self& self, Visitor& visitor) {
     visitor("frontend", self.frontend, Range{}, "",
             "features: features are extracted in every frame; direct: landmarks are aligned directly in the images "
-            "between keyframes; auto: the same, with pauses while this fails",
+            "between keyframes; auto: like direct, but with features for some frames after repeated failures",
             kCommon);
     visitor("use_capture_times", self.use_capture_times, Range{}, "",
             "use the capture time of each camera; false: the time of the frame",

@@ -26,7 +26,7 @@ class Relocaliser {
   // Searches the whole map for the pose of a described frame. Returns nullopt if no place is confirmed.
   virtual std::optional<FoundPlace> verify_place(const map::BundledMap& map, const frame::BundledFrame& frame) = 0;
 
-  // Of its index of places.
+  // Memory of its index of places, in bytes.
   virtual std::size_t memory_bytes() const { return 0; }
 };
 

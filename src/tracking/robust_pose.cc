@@ -18,10 +18,11 @@ constexpr double kFewInliers = 0.8, kMinority = 0.5;
 // Maximum squared normalised error, at the initial pose, of the matches that agree with it: four standard deviations.
 constexpr double kAgreesWithStart = 16.0;
 
-// Ratio of supports from which on another pose is another motion and not a variation of the first one.
+// Minimum ratio of supports at which another pose is a different motion and not a variation of the first one.
 constexpr double kMoreSupport = 1.1;
-// Ratio of the supports by landmarks from which on the whole images may decide otherwise than the landmarks. These know
-// the pose in the map; the images know the motion since the reference keyframe, whose pose may be wrong.
+// Minimum ratio of the supports by landmarks at which the agreement of all keypoints may change the choice. Landmarks
+// determine the pose in the map. The other keypoints only determine the motion since the reference keyframe, whose pose
+// may be wrong.
 constexpr double kComparable = 0.75;
 
 constexpr double kNew = 0.5;           // support of a new landmark
@@ -149,7 +150,8 @@ std::vector<std::uint8_t> agreeing_beyond_chance(const camera::Rig& rig,
                                                  std::span<const solver::PoseObservation> observations,
                                                  std::span<const double> window_px, const geometry::SE3& T_rig_world,
                                                  const solver::MotionModel& motion) {
-  constexpr double kDeviations = 5.0, kLeast = 10.0;  // matches more than by chance, where these are few
+  // Minimum number of matches beyond chance, if few are expected by chance.
+  constexpr double kDeviations = 5.0, kLeast = 10.0;
   const solver::PoseSolution at_pose = solver::solve_pose(rig, observations, T_rig_world, motion, {.rounds = 0});
   double expected = 0.0, variance = 0.0;
   for (std::size_t i = 0; i < observations.size(); ++i) {

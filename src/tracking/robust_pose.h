@@ -1,4 +1,4 @@
-// The pose of a frame when a considerable part of what the cameras see may move.
+// Estimates the pose of a frame in which a considerable part of the scene may be moving.
 #pragma once
 
 #include <span>
@@ -9,36 +9,37 @@
 
 namespace bslam::tracking {
 
-// How far the inliers of a frame spread over its images and over time. Each cell of a grid of 8 x 8 on every image that
-// has inliers counts a half, plus the time, in seconds and at most one, between the first and the last keyframe that
-// observe the landmark of one of them, the longest. An object that moves covers a small part of the images, however
-// many of its landmarks are found, and they soon become outliers. `observations` are those of `matches`, in order.
+// The support of a pose: how widely its inliers are spread over the images and over time. Each image has a grid of 8 x
+// 8 cells. A cell with inliers counts 1/2 + min(1, t), where t is the longest time in seconds between the first and the
+// last keyframe that observe the landmark of one of its inliers. A moving object covers few cells, however many of its
+// landmarks are found, and they soon become outliers. `observations` are those of `matches`, in order.
 double support(const map::BundledMap& map, const FrameMatches& matches,
                std::span<const solver::PoseObservation> observations, std::span<const std::uint8_t> inlier);
 
-// Whether landmarks that keyframes observed for long are found about as often as those observed for a short time.
-// `visible`: all that were searched for. What moves has been observed for a short time only: if that is what is found
-// and the rest is not, the pose is that relative to a moving object. True if too few of either
-// are visible to tell.
+// Returns true if landmarks that keyframes have observed for a long time are found about as often as those observed for
+// a short time. `visible`: all landmarks that were searched for. Landmarks on a moving object have only been observed
+// for a short time. If mainly these are found, the pose is relative to a moving object. Returns true if too few of
+// either kind are visible to decide.
 bool lasting_landmarks_found(const map::BundledMap& map, std::span<const LandmarkId> visible,
                              const FrameMatches& matches, std::span<const std::uint8_t> inlier);
 
-// Whether the map was started so short a time before the frame that no landmark has been observed for long.
+// Returns true if the map is so new that no landmark can have been observed for a long time.
 bool newly_started(const TrackInput& input, const frame::BundledFrame& frame);
 
-// Flags the matches that agree with a pose, if they are clearly more than of wrong matches would; otherwise none. A
-// wrong match is anywhere in its search window; `window_px` is the radius of that of each observation.
+// Flags the matches that agree with a pose, if there are clearly more of them than chance explains; otherwise flags
+// none. A wrong match has a random position in its search window. `window_px`: radius of the window of each observation
+// in level-0 pixels.
 std::vector<std::uint8_t> agreeing_beyond_chance(const camera::Rig& rig,
                                                  std::span<const solver::PoseObservation> observations,
                                                  std::span<const double> window_px, const geometry::SE3& T_rig_world,
                                                  const solver::MotionModel& motion);
 
-// As solver::solve_pose for the matches of a frame, in order; `predicted` is the initial pose. A robust kernel follows
-// the majority, and ends between two motions that many matches agree with. If a considerable part of the matches are
-// outliers, further poses are estimated: from the outliers, from the matches that agree with the prediction, and by
-// RANSAC if still most of them are outliers. Another pose replaces the first one if its support is clearly larger, or
-// if the first one could not be estimated. In a map that was just started, the agreement of all keypoints adds to the
-// support (tracking/scene_agreement.h).
+// As solver::solve_pose for the matches of a frame, in order; `predicted` is the initial pose. A robust kernel
+// converges to the majority of the matches, or between two motions that both have many matches. If a considerable part
+// of the matches are outliers, further poses are estimated: from the outliers, from the matches that agree with the
+// prediction, and by RANSAC if still most of them are outliers. Another pose replaces the first one if its support is
+// clearly larger, or if the first one could not be estimated. In a map that was just started, the agreement of all
+// keypoints adds to the support (tracking/scene_agreement.h).
 solver::PoseSolution robust_pose(const TrackInput& input, const frame::BundledFrame& frame, const FrameMatches& matches,
                                  std::span<const solver::PoseObservation> observations, const geometry::SE3& predicted,
                                  const solver::MotionModel& motion, const solver::PoseSolverOptions& options);

@@ -15,16 +15,16 @@ namespace {
 using geometry::SE3;
 
 constexpr int kMaxHamming = 60;         // bits
-constexpr double kRatio = 0.85;         // of the nearest to the second nearest descriptor
-constexpr double kMinCosine = 0.95;     // of the angle between the bearings of a match: 18 degrees
-constexpr double kDeviations = 1.5;     // of the difference of two positions
-constexpr double kNearest = 0.1;        // of the median distance
-constexpr double kMostOfMatches = 0.5;  // of a cell
+constexpr double kRatio = 0.85;         // maximum ratio of the nearest to the second nearest descriptor distance
+constexpr double kMinCosine = 0.95;     // minimum cosine of the angle between the bearings of a match: 18 degrees
+constexpr double kDeviations = 1.5;     // maximum difference of two positions in standard deviations
+constexpr double kNearest = 0.1;        // minimum distance of a point as a fraction of the median distance
+constexpr double kMostOfMatches = 0.5;  // fraction of the matches of a cell that must agree
 
-// Distance, in the plane that touches the unit sphere at a bearing, to the arc on which the point is seen: from
-// `infinite` to `nearest`. Infinite if the bearing is on another side. If the nearest point is behind the camera, the
-// rig would have passed it since the keyframe; the distance is then that to `infinite`, so that an absurd motion, with
-// which a long arc agrees easily, gains nothing.
+// Distance from a bearing to the epipolar arc on which its point can be seen, from `infinite` to `nearest`, in the
+// tangent plane of the unit sphere at the bearing. Infinite if the bearing is on another side. If the nearest point is
+// behind the camera, the rig would have passed it since the keyframe. The distance is then that to `infinite`, because
+// the arc would be so long that wrong motions agree with it easily.
 double distance_to_arc(const Eigen::Vector3d& bearing, const Eigen::Vector3d& infinite,
                        const Eigen::Vector3d& nearest) {
   const double i = infinite.dot(bearing), n = nearest.dot(bearing);
@@ -80,7 +80,7 @@ int SceneMatches::agreeing_cells(const SE3& T_rig_world) const {
     int all = 0, agree = 0;
   };
   std::vector<std::array<Counts, kCells * kCells>> cells(T_camera_rig_.size());
-  std::vector<SE3> T_now_before;  // of each camera
+  std::vector<SE3> T_now_before;  // motion of each camera between the keyframe and the frame
   for (std::size_t c = 0; c < cells.size(); ++c)
     T_now_before.push_back(T_camera_rig_[c] * T_rig_world * T_world_keyframe_ * T_rig_camera_before_[c]);
   for (const Pair& pair : pairs_) {

@@ -1,5 +1,5 @@
-// Which motion of the rig agrees with the images as a whole, also where no landmarks are known yet. A map that was just
-// started has landmarks only where a single frame tells their distance: near the rig, where people walk.
+// Compares a motion of the rig with all keypoints of the images, including those that are not landmarks. A new map has
+// landmarks only at points whose distance a single frame determines. These are near the rig, where people may walk.
 #pragma once
 
 #include <span>
@@ -13,14 +13,15 @@ namespace bslam::tracking {
 // Keypoints of a frame that look like keypoints of the same camera in a keyframe, in all cameras.
 class SceneMatches {
  public:
-  // `observations`: of landmarks in the frame; their median distance tells how near a point may be.
+  // `observations`: observations of landmarks in the frame; their median distance determines the minimum distance of a
+  // point.
   SceneMatches(const TrackInput& input, const frame::BundledFrame& frame,
                std::span<const solver::PoseObservation> observations, const geometry::SE3& T_rig_world);
 
   // Number of cells of the grids of `support` (tracking/robust_pose.h) in which most of the matches agree with the
-  // pose: the point may have any distance from a tenth of the median one to infinity. While the rig does not turn,
-  // what moves with it looks like points at infinity and agrees with any translation; other points contradict a pose
-  // that follows it. Excluded cameras have no matches.
+  // pose: the point may have any distance from a tenth of the median one to infinity. If the rig does not rotate,
+  // points that move with the rig look like points at infinity and agree with any translation, but static points
+  // contradict a pose that follows them. Excluded cameras have no matches.
   int agreeing_cells(const geometry::SE3& T_rig_world) const;
 
  private:

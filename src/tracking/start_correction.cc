@@ -13,11 +13,11 @@ namespace bslam::tracking {
 namespace {
 
 constexpr int kMaxHamming = 60;  // bits
-constexpr double kRatio = 0.85;  // of the nearest to the second nearest descriptor
+constexpr double kRatio = 0.85;  // maximum ratio of the nearest to the second nearest descriptor distance
 constexpr std::size_t kMinMatches = 60;
-constexpr double kMinAgreeing = 0.6;  // fraction of the matches that agree with the correction
-constexpr int kMinWithDepth = 25;     // number of these that are in front of both cameras
-constexpr double kClearly = 1.5;      // factor by which their number grows
+constexpr double kMinAgreeing = 0.6;  // minimum fraction of the matches that agree with the correction
+constexpr int kMinWithDepth = 25;     // minimum number of these that are in front of both cameras
+constexpr double kClearly = 1.5;      // minimum factor by which the correction increases their number
 constexpr double kTolerancePx = 2.0;
 constexpr double kMaxAngle = 0.1;      // rad; a larger one is another arrangement of the cameras
 constexpr double kMinBaseline = 1e-3;  // m
@@ -35,8 +35,8 @@ std::vector<PixelPair> matches_of(const frame::CameraFrame& a, const frame::Came
   return out;
 }
 
-// Whether most matches are explained by the same image of both cameras, by exchanged cameras, or by an inverted
-// transform: mistakes that a small rotation must not hide.
+// Returns true if most matches are explained by identical images of both cameras, by exchanged cameras, or by an
+// inverted transform. A small corrected rotation must not hide such mistakes.
 bool other_mistake(const camera::Camera& of_i, const camera::Camera& of_j, const geometry::SE3& T_j_i,
                    std::span<const PixelPair> matches, double tolerance) {
   constexpr double kSamePx = 0.5;
@@ -79,7 +79,8 @@ std::optional<geometry::SE3> agreeing_pose(const camera::Rig& rig, std::size_t i
   return second ? correction * T_j_i : (correction * T_i_j).inverse();
 }
 
-// Whether some camera is rotated by more than a knock explains: it is another arrangement of the cameras.
+// Returns true if some camera is rotated too far for a camera that was bumped: the arrangement of the cameras is
+// another one.
 bool rearranged(const camera::Rig& rig, const camera::Rig& given) {
   for (std::size_t c = 0; c < rig.size(); ++c) {
     const geometry::SE3 difference = rig.cam_from_rig(c) * given.rig_from_cam(c);

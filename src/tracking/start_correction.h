@@ -9,10 +9,10 @@
 
 namespace bslam::tracking {
 
-// The rig with the rotations of cameras corrected, each relative to an earlier one that overlaps with it, from matches
-// of descriptors in `frame` without the calibration. Returns nullopt unless the correction of some camera makes clearly
-// more matches agree, and most of them. Takes some 5 ms per pair.
-// `given`: the rig before any correction, from which no camera is rotated by more than some degrees.
+// Returns the rig with corrected rotations of cameras, each relative to an earlier camera that overlaps with it. The
+// corrections are estimated from descriptor matches in `frame` that do not use the calibration. Returns nullopt unless
+// the correction of some camera makes clearly more matches agree, and most of them. Takes some 5 ms per pair. `given`:
+// the rig before any correction, from which no camera is rotated by more than some degrees.
 std::optional<camera::Rig> with_corrected_rotations(const camera::Rig& rig, const camera::Rig& given,
                                                     const frame::BundledFrame& frame);
 

@@ -16,7 +16,7 @@ namespace {
 using geometry::SE3;
 
 struct Coarse {
-  frame::BundledFrame frame;  // its twist is estimated together with the pose
+  frame::BundledFrame frame;  // a copy; its twist is estimated together with the pose
   SE3 T_rig_world;
   FrameMatches matches;  // inliers
   LostReason reason = LostReason::kNone;
@@ -116,8 +116,8 @@ bool track_in_wide_windows(const TrackInput& input, const std::vector<LandmarkId
   return true;
 }
 
-// The search in wide windows, and if it fails some time after the last pose, in wider ones: the rig may have turned the
-// further the longer nothing is known of it.
+// Searches in wide windows. If that fails, searches once more in windows whose radius grows with the time since the
+// last pose, because the rig may have rotated further in a longer time.
 bool track_in_wide_windows(const TrackInput& input, const std::vector<LandmarkId>& landmarks,
                            const TrackingOptions& options, ThreadPool& pool, Coarse& out) {
   constexpr double kUsualInterval_s = 0.1;
@@ -144,7 +144,7 @@ Coarse track_last_frame(const TrackInput& input, const frame::BundledFrame& fram
   return out;
 }
 
-// The pose that was estimated before, without matches.
+// The pose from direct tracking (input.estimate), without matches.
 Coarse estimated(const TrackInput& input, const frame::BundledFrame& frame) {
   Coarse out{frame, input.estimate->T_rig_world, {}, LostReason::kNone, excluded(input.state, input.map.rig().size())};
   out.matches.resize(frame.cameras.size());
@@ -152,7 +152,8 @@ Coarse estimated(const TrackInput& input, const frame::BundledFrame& frame) {
   return out;
 }
 
-// The coarse pose: the one estimated before if all cameras support it or no other is found.
+// Returns the pose from direct tracking if all cameras support it, otherwise the pose tracked from the last frame. If
+// that fails, falls back to direct tracking.
 Coarse coarse_pose(const TrackInput& input, const frame::BundledFrame& frame, const TrackingOptions& options,
                    ThreadPool& pool) {
   if (input.estimate && input.estimate->all_cameras) return estimated(input, frame);
@@ -168,11 +169,11 @@ bool any_due_for_retry(const TrackerState& state, TimeNs time_ns, const Consensu
 struct Fine {
   solver::PoseSolution solution;
   geometry::Vector6d twist;  // rad/s, m/s
-  FrameMatches matches;      // all, inliers and outliers
-  AlignedMatches aligned;    // of all matches
+  FrameMatches matches;      // inliers and outliers
+  AlignedMatches aligned;    // for all of `matches`
   std::vector<LandmarkId> visible;
-  std::vector<LandmarkCounts> views;  // per camera, landmarks of the local view
-  std::vector<LandmarkCounts> wide;   // the same in wide windows, if an excluded camera is due for a retry
+  std::vector<LandmarkCounts> views;  // per camera: landmarks of the local view that are expected and found
+  std::vector<LandmarkCounts> wide;   // the same with wide windows; empty unless an excluded camera is due for a retry
 };
 
 // Per camera.
@@ -212,10 +213,10 @@ Fine track_local_view(const TrackInput& input, const Coarse& coarse, const Track
   return out;
 }
 
-// Whether the landmarks of the local view, found near their projections at the coarse pose, confirm it, and the fine
-// pose is that of most of these. Where there is little but noise, most of them are matched wrongly, and the pose is
-// right nevertheless. The landmarks that gave a coarse pose from the last frame do not count; those that gave one
-// of direct tracking do, since they have supported it.
+// Returns true if more landmarks of the local view agree with the coarse pose than chance explains, and most of them
+// are inliers of the fine pose. In very noisy images most matches are wrong although the pose is right, so that the
+// inlier ratio alone would reject it. Landmarks that the coarse pose was computed from are not counted; a coarse pose
+// from direct tracking has no such matches.
 bool coarse_pose_confirmed(const TrackInput& input, const Coarse& coarse, const Fine& fine,
                            const TrackingOptions& options) {
   constexpr double kMost = 0.5;
@@ -230,7 +231,7 @@ bool coarse_pose_confirmed(const TrackInput& input, const Coarse& coarse, const 
     for (const Match& m : fine.matches[c]) {
       const std::size_t at = i++;
       if (std::ranges::binary_search(known, m.landmark)) continue;
-      // of the predicted level, from which that of the keypoint may differ by one
+      // The search radius is scaled by the predicted pyramid level, which may be one below that of the keypoint.
       const int level = std::max(0, coarse.frame.cameras[c].keypoints.level[m.keypoint.index()] - 1);
       observations.push_back(all[at]);
       window_px.push_back(radius_px * std::pow(input.features.pyramid.scale_factor, level));

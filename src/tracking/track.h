@@ -18,7 +18,7 @@ inline constexpr double kMaxPrediction_s = 0.5;  // maximum time between frames 
 
 enum class TrackStatus { kNotStarted, kTracking, kLost };
 
-// Why a frame has no pose. A frame whose pose has too little support is lost; no predicted pose is returned.
+// The reason why a frame has no pose. A frame whose pose has too little support is lost; no predicted pose is returned.
 enum class LostReason {
   kNone,
   kNotStarted,
@@ -74,8 +74,9 @@ struct TrackerState {
   std::vector<LandmarkId> landmarks;          // inliers of the last tracked frame
   std::vector<CameraConsensusState> cameras;  // empty until a frame was tracked
   int frames_since_keyframe = 0;
-  int best_overlap = 0;  // maximum number of landmarks of the reference keyframe matched in a frame since then
-  std::vector<int> best_direct_overlap;  // per camera, the same of frames that were tracked directly
+  // Maximum number of landmarks of the reference keyframe that a frame since that keyframe has matched.
+  int best_overlap = 0;
+  std::vector<int> best_direct_overlap;  // per camera: the same maximum for frames that were tracked directly
   DirectState direct;
   std::vector<map::VisibilityCount> visibility_counts;  // not yet added to the map
 };
@@ -87,12 +88,12 @@ struct TrackOutput {
   TrackResult result;
   TrackerState state;
   FrameMatches matches;  // inliers
-  FrameMatches matched;  // before outliers were removed
+  FrameMatches matched;  // including outliers
   // The refined frame: keypoints of the inliers are aligned to their landmarks, the velocity is the estimated one, and
   // excluded cameras have no keypoints. Empty if the frame has no pose.
   frame::BundledFrame frame;
   bool keyframe_due = false;
-  bool at_similar_keyframe = false;  // which is the reference now, so that none is due although the old one is far away
+  bool at_similar_keyframe = false;  // the reference was changed to a similar keyframe, so that no new keyframe is due
 };
 
 // A pose that direct tracking found for a frame.
@@ -109,7 +110,7 @@ struct TrackInput {
   feature::FeatureModel features = {};
   std::uint64_t seed = 1;
   std::span<const image::ImageView> masks = {};  // per camera, an empty view if it has no mask; or empty
-  std::optional<EstimatedPose> estimate = {};    // if the pose of this frame was estimated before
+  std::optional<EstimatedPose> estimate = {};    // pose of this frame from direct tracking, if it was tried before
 };
 
 // Estimates the pose of `frame`. The map must have at least one keyframe.

@@ -14,10 +14,11 @@ namespace {
 
 using geometry::SE3;
 
-// Minimum fraction of the aligned landmarks that agree with the pose: with fewer, features decide between motions. In a
-// map that was just started, most landmarks may be on something that moves.
+// Minimum fraction of the aligned landmarks that agree with the pose. With fewer, the frame is tracked with features,
+// which distinguish several motions. In a new map, most landmarks may be on a moving object.
 constexpr double kMinInlierRatio = 0.5, kMinRatioAtStart = 0.8;
-// A camera with few inliers gets features after this number of frames: it may see something new.
+// Features are extracted after this number of frames if a camera has few inliers, because it may observe a new part of
+// the scene.
 constexpr int kFewInliersInterval = 8;
 
 // Landmarks aligned in the images of a frame.

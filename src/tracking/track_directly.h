@@ -8,7 +8,7 @@
 
 namespace bslam::tracking {
 
-// Why a frame needs extracted features.
+// The reason why a frame needs extracted features.
 enum class DirectFailure {
   kNone,
   kNotTried,
@@ -16,13 +16,14 @@ enum class DirectFailure {
   kNoPose,        // too few landmarks could be aligned
   kFewInliers,    // some camera has lost a considerable part of its inliers since the last extraction
   kKeyframeDue,
-  kDoubtful,  // of a map that was just started, many landmarks do not agree
+  kDoubtful,  // the map is new, and many of its landmarks do not agree with the pose
 };
 
 struct DirectOutput {
   DirectFailure failure = DirectFailure::kNotTried;
-  std::optional<TrackOutput> output = {};  // if a pose was found, also if there are few inliers or a keyframe is due
-  bool all_cameras = false;                // every camera supports the pose
+  // Set if a pose was found, even if there are few inliers or a keyframe is due.
+  std::optional<TrackOutput> output = {};
+  bool all_cameras = false;  // every camera supports the pose
 };
 
 // Estimates the pose of `frame`, whose cameras have no keypoints. The map must have at least one keyframe. The

@@ -19,7 +19,7 @@ std::vector<CameraCounts> camera_counts(const frame::BundledFrame& frame, const 
   return counts;
 }
 
-// Adds the reprojection errors of the inliers. Landmarks behind a camera count as none.
+// Adds the reprojection errors of the inliers. Landmarks behind a camera are not counted.
 void add_errors(const map::BundledMap& map, const frame::BundledFrame& frame, const geometry::SE3& T_rig_world,
                 const FrameMatches& inliers, std::vector<CameraCounts>& counts) {
   const camera::Rig rig = frame::rig_of(map.rig(), frame);
@@ -44,7 +44,7 @@ void count_visibility(const std::vector<LandmarkId>& visible, const std::vector<
 }
 
 // The noise of the image relative to the map, and the error of the reference keyframe. The noise is the inverse of the
-// information, corrected for the inliers that the bound on their errors has cut off.
+// information, corrected for the truncation of the inliers at the outlier bound.
 geometry::Matrix6d covariance_of(const solver::PoseSolution& solution, const map::BundledMap& map,
                                  const map::AnchoredPose& anchored) {
   const geometry::Matrix6d noise =

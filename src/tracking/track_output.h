@@ -1,4 +1,4 @@
-// What both front ends do with the pose of a frame: the result, and the state for the next frame.
+// Computes the result and the state for the next frame from the pose of a frame, for both front ends.
 #pragma once
 
 #include <vector>
@@ -16,7 +16,7 @@ std::vector<LandmarkId> last_landmarks(const map::BundledMap& map, const Tracker
 bool supported(const solver::PoseSolution& solution, std::size_t num_matches, int min_inliers,
                const TrackingOptions& options);
 
-// What was found in a frame.
+// The pose and the matches of a frame.
 struct TrackedFrame {
   frame::BundledFrame frame;  // see TrackOutput::frame
   solver::PoseSolution solution;

@@ -257,8 +257,9 @@ void Tracker::track(const Input& input, TrackOutcome& outcome) {
   outcome.observed = observed_keypoints(output.frame, std::move(output.matched), std::move(output.matches));
 }
 
-// If the features of the frame give no pose but direct tracking has found one, it is kept, except after several frames
-// in a row of which the features gave none: they are better evidence then. Returns true if it is kept.
+// If the features of the frame give no pose but direct tracking has found one, that pose is kept. It is not kept if
+// this has already happened in several frames in a row, because then the features are better evidence. Returns true if
+// it is kept.
 bool Tracker::keep_direct_pose(const Input& input, TrackOutcome& outcome) const {
   constexpr int kMaxKept = 5;
   if (!input.direct.outcome || outcome.next.direct_kept >= kMaxKept) return false;
@@ -271,7 +272,7 @@ bool Tracker::keep_direct_pose(const Input& input, TrackOutcome& outcome) const 
 }
 
 bool Tracker::gives_up(const FrontEndState& state, TimeNs time_ns) const {
-  constexpr int kFew = 5;  // frames in which the map is searched at least
+  constexpr int kFew = 5;  // minimum number of frames in which the map is searched
   return state.frames_lost >= options_.new_submap_after ||
          (state.frames_lost >= kFew && to_seconds(time_ns - state.lost_since_ns) >= options_.new_submap_after_s);
 }

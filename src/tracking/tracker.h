@@ -28,11 +28,13 @@ struct TrackerOptions {
   feature::FeatureOptions features;
   std::uint64_t seed = 1;
   bool localize_only = false;  // never propose an edit of the map
-  bool correct_rig = true;     // before a map is started (tracking/start_correction.h)
-  // The cameras of the rig that the run has, 0: all; the others belong to other rigs of the map, and never have images.
+  bool correct_rig = true;     // correct rotations of the rig before a map is started (tracking/start_correction.h)
+  // First and number of the cameras that belong to the run; number 0: all. The others belong to other rigs of the map
+  // and never have images.
   std::size_t first_camera = 0, num_cameras = 0;
   int new_submap_after = 20;  // number of frames with features but without a pose after which a new submap is started
-  double new_submap_after_s = 2.0;  // or time from the first of them, s, if there are a few
+  // Seconds since the first of these frames after which a new submap is started, if there are a few of them.
+  double new_submap_after_s = 2.0;
 };
 
 // Parameters for the extraction and bundling of the next frame, per camera.
@@ -46,12 +48,12 @@ struct FramePlan {
 
 inline constexpr int kMaxPendingFrames = 10;  // number of frames in which a pending keyframe is waited for
 
-// A keyframe that is being created of a frame that was tracked directly.
+// A keyframe that is being created from a frame that was tracked directly.
 struct PendingKeyframe {
   FrameId frame;
-  map::AnchoredPose pose;          // of the frame, found directly
-  std::size_t first_keyframe = 0;  // number of keyframe slots of the map then: its id is not smaller
-  int frames = 0;                  // number of frames since
+  map::AnchoredPose pose;          // pose of the frame from direct tracking
+  std::size_t first_keyframe = 0;  // number of keyframe slots of the map when it was requested; its id is not smaller
+  int frames = 0;                  // number of frames since the request
 };
 
 // State of the front end that is carried from frame to frame.
@@ -65,9 +67,9 @@ struct FrontEndState {
   std::vector<std::shared_ptr<const frame::BundledFrame>> waiting;
   int direct_failures = 0;  // consecutive attempts of direct tracking that found no pose
   int direct_pause = 0;     // number of frames until the next attempt
-  int direct_kept = 0;      // poses found directly that were kept since the features of a frame last gave a pose
+  int direct_kept = 0;      // number of poses from direct tracking that were kept since features last gave a pose
   std::optional<PendingKeyframe> pending;
-  // The last pending keyframe was not created: the next one is made of a frame with features.
+  // The last pending keyframe was not created. The next keyframe must come from a frame with features.
   bool keyframe_failed = false;
   int rig_checks = 0, rig_corrections = 0;  // before a map is started: frames since the last check, corrections so far
   int reduction = 0;                        // level of tracking/reduced_work.h
@@ -99,8 +101,8 @@ struct TrackOutcome {
   FrameRecord record;
   FrontEndState next;
   std::optional<ProposedEdit> edit;
-  bool keyframe_wanted = false;                  // a keyframe is to be created of the frame later (see create_keyframe)
-  std::vector<BetweenKeyframes> early;           // frames of a monocular initialisation, once it succeeded
+  bool keyframe_wanted = false;         // a keyframe is to be created from the frame later (see create_keyframe)
+  std::vector<BetweenKeyframes> early;  // frames of a monocular initialisation, once it succeeded
   std::vector<ObservedKeypoints> observed = {};  // per camera
 };
 
@@ -108,13 +110,13 @@ struct TrackOutcome {
 struct KeyframeRequest {
   frame::BundledFrame frame;  // for Tracker::create_keyframe with extracted and bundled keypoints
   FrontEndState before;       // state before the frame
-  map::AnchoredPose pose;     // found directly
+  map::AnchoredPose pose;     // pose from direct tracking
 };
 
-// What direct tracking found in a frame.
+// The result of direct tracking of a frame.
 struct DirectAttempt {
   DirectFailure failure = DirectFailure::kNotTried;
-  std::optional<TrackOutcome> outcome = {};  // if a pose was found; final if there is no failure
+  std::optional<TrackOutcome> outcome = {};  // set if a pose was found; final if there is no failure
   bool all_cameras = false;                  // every camera supports the pose
 };
 
@@ -131,7 +133,8 @@ class Tracker {
 
   // Returns true if the next frame is to be tracked without features first.
   bool tracks_directly(const FrontEndState& state) const;
-  // Tracks a frame without features. If that fails, the frame has to be processed with features, and with the attempt.
+  // Tracks a frame without features. If that fails, the frame must be tracked again with features; the result of this
+  // attempt is passed to that call.
   DirectAttempt process_directly(const FrontEndState& state, const frame::BundledFrame& frame,
                                  const FrameImages& images, const map::MapSnapshot& map) const;
 
@@ -147,7 +150,7 @@ class Tracker {
                                               const map::MapSnapshot& map) const;
 
   // Continues from the pending keyframe if it is in the map, as if its frame had become a keyframe when it was tracked.
-  // It is not waited for any more after kMaxPendingFrames.
+  // Gives up waiting for it after kMaxPendingFrames.
   std::optional<CreatedKeyframe> adopt_keyframe(const map::BundledMap& map, FrontEndState& state) const;
 
   // Completes an outcome with the ids assigned by the commit of its edit.
@@ -156,7 +159,7 @@ class Tracker {
   // The pose in the current map of a frame captured during a monocular initialisation (see pose_between).
   std::optional<TrackResult> locate_early(const map::BundledMap& map, const BetweenKeyframes& early) const;
 
-  // Of the index of places of its relocaliser.
+  // Memory of the index of places of its relocaliser, in bytes.
   std::size_t place_index_bytes() const { return relocaliser_ ? relocaliser_->memory_bytes() : 0; }
 
  private:

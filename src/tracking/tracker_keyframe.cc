@@ -29,7 +29,7 @@ std::vector<map::VisibilityCount> folded(std::vector<map::VisibilityCount> count
   return out;
 }
 
-// The keyframe that was created of the pending frame; invalid if the map has none.
+// The keyframe that was created from the pending frame; invalid if the map has none.
 KeyframeId keyframe_of(const map::BundledMap& map, const PendingKeyframe& pending) {
   for (std::size_t k = pending.first_keyframe; k < map.keyframe_slots(); ++k) {
     const KeyframeId id(k);
@@ -104,7 +104,7 @@ std::optional<CreatedKeyframe> Tracker::adopt_keyframe(const map::BundledMap& ma
   const auto T_rig_world = track.anchored.resolve(map), T_then_world = pending.pose.resolve(map);
   const CreatedKeyframe created{pending.frame, keyframe};
   if (!T_rig_world || !T_then_world || map.root_of(track.anchored.reference) != map.root_of(keyframe)) return created;
-  // The motion since the frame is that of direct tracking; the keyframe has the pose from its features.
+  // The motion since the frame comes from direct tracking, the pose of the keyframe from its features.
   const geometry::SE3 T_rig_keyframe = *T_rig_world * T_then_world->inverse();
   std::vector<LandmarkId> landmarks = map::landmarks_of(map, keyframe);
   std::vector<map::VisibilityCount> counts = std::move(track.visibility_counts);

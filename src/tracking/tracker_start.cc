@@ -32,7 +32,7 @@ TrackResult not_started(const BundledFrame& frame) {
   return result;
 }
 
-// Returns true if both frames have keypoints, but no camera has them in both.
+// Returns true if both frames have keypoints, but no camera has keypoints in both of them.
 bool from_other_cameras(const BundledFrame& a, const BundledFrame& b) {
   for (std::size_t c = 0; c < a.cameras.size(); ++c) {
     if (!a.cameras[c].keypoints.empty() && !b.cameras[c].keypoints.empty()) return false;
@@ -52,7 +52,8 @@ void Tracker::start(const Input& input, TrackOutcome& outcome) const {
   map::MapDraft draft(input.map);
   if (relocaliser_) relocaliser_->describe(input.frame);
   if (std::optional<StartedMap> started = initialise(input, outcome.next, draft)) {
-    // All submaps share the scale that the first one declared: where that is not metric, each has a unit of its own.
+    // The first submap declares for the whole map whether its scale is metric. If it is not, each submap has its own
+    // arbitrary unit of length.
     if (input.map->num_keyframes() == 0) draft.set_scale(started->scale, started->scale_deviation);
     outcome.edit = ProposedEdit{ProposedEdit::Kind::kStart, std::move(draft),
                                 std::move(started->keyframes.back().landmarks), input.map->landmark_slots()};
@@ -96,8 +97,8 @@ bool Tracker::correct_rig(const Input& input, TrackOutcome& outcome) const {
   return true;
 }
 
-// Stores the frame. It replaces the reference frame if that is too old or has too few matches with it; frames of other
-// cameras, which cannot have any, do not replace it.
+// Stores the frame. The frame becomes the new reference frame if the present one is too old or has too few matches with
+// it. A frame of other cameras cannot be matched with the reference frame and does not replace it.
 void Tracker::keep_reference_frame(const Input& input, FrontEndState& state) const {
   const InitialisationOptions& options = options_.tracking.initialisation;
   if (state.start_reference && input.frame.num_keypoints() < static_cast<std::size_t>(options.min_monocular))

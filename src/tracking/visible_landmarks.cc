@@ -16,8 +16,8 @@ constexpr double kMaxViewAngle = 1.05;  // rad, as in ProjectionSearchOptions
 // Number of frames for which a local view is used while the map does not change.
 constexpr int kFramesOfView = 8;
 
-// Appends the landmarks that are predicted visible in each camera, but those for which `skip` has a flag. `first`: the
-// index of the first landmark.
+// Appends the landmarks that are predicted visible in each camera, except those flagged in `skip`. `first`: the index
+// of the first landmark.
 void add_visible(const TrackInput& input, const frame::BundledFrame& frame, const SE3& T_rig_world,
                  std::span<const LandmarkId> landmarks, std::span<const matching::SearchPoint> points,
                  std::span<const std::uint8_t> skip, std::size_t first, ThreadPool& pool, Candidates& out) {

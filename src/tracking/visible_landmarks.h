@@ -12,7 +12,7 @@ namespace bslam::tracking {
 struct LocalView {
   MapVersion version;
   KeyframeId reference;
-  std::vector<LandmarkId> landmarks;          // as map::local_landmarks returns them
+  std::vector<LandmarkId> landmarks;          // in the order of map::local_landmarks
   std::vector<matching::SearchPoint> points;  // one for each of them
 };
 
@@ -28,14 +28,14 @@ struct Candidate {
   LandmarkId landmark;
   Eigen::Vector2d pixel;    // predicted
   double coarseness = 0;    // size of its reference patch in the image, relative to that of a patch of level 0
-  std::uint32_t index = 0;  // among all landmarks that were examined
+  std::uint32_t index = 0;  // index among all examined landmarks
 };
 using Candidates = std::vector<std::vector<Candidate>>;  // per camera
 
-// Of the landmarks of the last frame, in every camera those with the largest patches in their parts of the image, as
-// many of `coarse_per_image` as of `per_image` are aligned afterwards: their alignment tolerates the largest errors of
-// the predicted pose. They are spread over the image, because the largest of all may belong to one near object, which
-// may move.
+// Selects landmarks of the last frame for the first, coarse alignment: in every camera those with the largest patches
+// in their parts of the image, because their alignment tolerates the largest errors of the predicted pose. A camera
+// gets the same fraction of `coarse_per_image` as of `per_image` afterwards. The landmarks are spread over the image,
+// because the largest patches may all belong to one near object, which may move.
 Candidates coarsest_landmarks(const TrackInput& input, const frame::BundledFrame& frame,
                               const geometry::SE3& T_rig_world, const LastLandmarks& last, const DirectOptions& options,
                               ThreadPool& pool);
@@ -45,7 +45,7 @@ Candidates coarsest_landmarks(const TrackInput& input, const frame::BundledFrame
 struct LocalLandmarks {
   std::shared_ptr<const LocalView> view;
   Candidates candidates;
-  std::vector<LandmarkId> expected;  // those of the candidates, in order of id, each once
+  std::vector<LandmarkId> expected;  // landmarks of the candidates, in order of id, each once
   // Landmarks of the last frame that are in view but no candidates because there are enough others, in order of id.
   std::vector<LandmarkId> others;
 };

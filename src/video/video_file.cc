@@ -15,9 +15,10 @@
 namespace bslam::video {
 namespace {
 
-// Of the images decoded last, since several threads read ahead; at least one is kept.
+// Maximum memory of the images decoded last, which are kept because several threads read ahead; at least one is kept.
 constexpr std::size_t kCachedImages = 24, kCachedBytes = std::size_t{1} << 26;
-constexpr std::size_t kFarAhead = 200;  // images; from there on seeking is faster than decoding all before
+// Number of images; for larger distances seeking is faster than decoding all images in between.
+constexpr std::size_t kFarAhead = 200;
 constexpr int kMaxSidePx = 20000;
 
 // Everything of one open file; released in the order FFmpeg needs.
@@ -34,7 +35,7 @@ class Decoder {
   Decoder(const Decoder&) = delete;
   Decoder& operator=(const Decoder&) = delete;
 
-  // Returns what is wrong; empty if nothing is.
+  // Returns a description of the problem; empty if there is none.
   std::string open(const std::string& path);
   // Returns the presentation time of the next packet of the video, without decoding it; nullopt at the end.
   std::optional<std::int64_t> next_time();
@@ -124,7 +125,7 @@ void Decoder::send_packet() {
     f_.av_packet_unref(packet_);
   ended_ = status < 0;
   int sent = AVERROR(EAGAIN);
-  // After an error the decoder may first have to give what it has, which is damaged.
+  // After an error the decoder may first have to output its remaining images, which are damaged.
   for (int k = 0; k < kTries && sent == AVERROR(EAGAIN); ++k) {
     sent = f_.avcodec_send_packet(codec_, ended_ ? nullptr : packet_);
     if (sent != AVERROR(EAGAIN)) break;

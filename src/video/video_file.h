@@ -28,9 +28,9 @@ class VideoFile {
   virtual int width() const = 0;
   virtual int height() const = 0;
   virtual std::string codec() const = 0;  // such as "h264"
-  // When the images are shown, relative to the first one: increasing, in nanoseconds.
+  // Presentation times of the images relative to the first one, increasing, in nanoseconds.
   virtual const std::vector<TimeNs>& times() const = 0;
-  // For the user: what is damaged or missing.
+  // Messages for the user about damaged or missing parts.
   virtual const std::vector<std::string>& warnings() const = 0;
 
   // Returns an image. Reading in order is fast; other orders decode again from the last image that can be decoded

@@ -19,7 +19,7 @@ namespace {
 constexpr std::uint32_t kMaxHeader = 16 * 1024;
 constexpr auto kResponseTime = std::chrono::seconds(30);
 constexpr auto kDrainTime = std::chrono::seconds(5);
-constexpr int kSendBuffer = 256 * 1024;  // bytes; more would only delay what is newest
+constexpr int kSendBuffer = 256 * 1024;  // bytes; a larger buffer would only delay the newest update
 
 std::string_view view(beast::string_view text) { return {text.data(), text.size()}; }
 
@@ -33,7 +33,7 @@ RequestHead head_of(const Request& request) {
           .websocket = beast::websocket::is_upgrade(request)};
 }
 
-// The answer to what is not a proper request.
+// The answer to an invalid request.
 Response response_to(ErrorCode error, std::uint64_t max_body) {
   if (error == http::error::body_limit)
     return {413, "The request is too long: at most " + std::to_string(max_body) + " bytes are accepted.\n"};

@@ -26,7 +26,7 @@ class Connections {
   // `handler` must outlive the connections. Without `upgrade` WebSockets are not supported.
   Connections(const HttpLimits& limits, RequestHandler& handler, Upgrade upgrade = {});
 
-  // What the thread of the server runs. With this object it destroys all connections that are left.
+  // The event loop of the server's thread. Its destruction closes all remaining connections.
   boost::asio::io_context& context() { return context_; }
 
   // Begins to accept connections. Errors: see HttpServer::start.
@@ -53,9 +53,10 @@ class Connections {
   bool loopback_ = true;
   std::size_t open_ = 0;          // connections
   std::size_t answering_ = 0;     // accepted requests whose answer is not sent
-  std::uint64_t body_bytes_ = 0;  // of all requests that are not answered, as declared
+  std::uint64_t body_bytes_ = 0;  // total declared size of the bodies of all requests that are not answered yet
   std::function<void()> idle_;
-  boost::asio::io_context context_{1};  // after what connections use, which it destroys
+  // Declared after the members that connections use, because its destructor destroys the connections.
+  boost::asio::io_context context_{1};
   boost::asio::ip::tcp::acceptor acceptor_{context_};
 };
 

@@ -18,16 +18,18 @@
 namespace bslam::web_server {
 
 struct ServerOptions {
-  std::string address = "127.0.0.1";  // of the interface
+  std::string address = "127.0.0.1";  // address of the interface
   std::uint16_t port = 0;             // 0: any free one
   bool or_any_port = false;           // if the port is in use, any free one is taken
 };
 
 struct HttpLimits {
-  std::size_t connections = 16;           // further ones are closed at once
-  std::uint64_t body_bytes = 0;           // of one request; a longer one is answered with 413
-  std::uint64_t all_bodies_bytes = 0;     // of all requests that are not answered; a further one is answered with 503
-  std::chrono::seconds request_time{10};  // in which a whole request must arrive; else its connection is closed
+  std::size_t connections = 16;  // further ones are closed at once
+  std::uint64_t body_bytes = 0;  // maximum of one request; a longer one is answered with 413
+  // Maximum of all unanswered requests together; a further one is answered with 503.
+  std::uint64_t all_bodies_bytes = 0;
+  // Time in which a whole request must arrive; otherwise its connection is closed.
+  std::chrono::seconds request_time{10};
 };
 
 struct Response {
@@ -49,8 +51,8 @@ class RequestHandler {
   virtual std::optional<Response> refuse(const RequestHead& head) = 0;
   // An accepted request with its whole body.
   virtual void handle(const RequestHead& head, std::string body, Respond respond) = 0;
-  // Every request, when its answer is known: also those with an error of HTTP (then the head may be empty), and those
-  // that took too long, which count as 408 and get no answer.
+  // Called for every request when its answer is known. This includes requests with an HTTP error (then the head may be
+  // empty) and requests that took too long, which count as 408 and get no answer.
   virtual void answered(const RequestHead& head, int status);
 };
 

@@ -10,7 +10,7 @@ namespace bslam::web_server {
 // 32 random hexadecimal digits, of the random source of the operating system.
 std::string make_token();
 
-// What a request says before its body. Headers that are missing are empty.
+// The request line and headers of a request. Missing headers are empty.
 struct RequestHead {
   std::string_view target;  // path and query, as sent
   std::string_view host = {};

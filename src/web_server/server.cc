@@ -26,7 +26,7 @@ namespace websocket = beast::websocket;
 using ErrorCode = boost::system::error_code;
 using SharedText = std::shared_ptr<const std::string>;
 
-constexpr double kMaxShare = 0.03;  // of the processor time of a core that updates of a channel may take
+constexpr double kMaxShare = 0.03;  // maximum fraction of a core's time that updates of a channel may take
 
 }  // namespace
 
@@ -35,7 +35,7 @@ struct LatestUpdate {
   std::uint64_t version = 0;  // 0: none
 };
 
-// What connections need of the server. All of it runs in one thread.
+// The part of the server that connections use. All of it runs in one thread.
 struct Hub {
   Content& content;
   std::vector<Channel> channels;
@@ -227,7 +227,7 @@ class Server::Implementation final : public RequestHandler {
     }
   }
 
-  // Sends the newest update of a channel to those that are ready, again and again as long as there are viewers.
+  // Sends the newest update of a channel to the browsers that are ready, repeatedly while there are viewers.
   void tick(std::size_t c) {
     ticking_[c] = !hub_.viewers.empty() && !hub_.finishing;
     if (!ticking_[c]) return;

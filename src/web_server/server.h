@@ -19,7 +19,7 @@ class Content {
  public:
   virtual ~Content() = default;
 
-  // The page, with what is known now.
+  // Returns the page with the current data.
   virtual std::string page() = 0;
   // The newest update of a channel, as text, or nullopt if nothing has changed since the last call. Called only if a
   // browser is ready for it.

@@ -3,10 +3,10 @@
 
 namespace bslam::web_server {
 
-// Gives the calling thread the time that others leave. On Linux only; a failure has no consequences but for the speed.
+// Lowers the priority of the calling thread (nice 10). On Linux only; a failure only affects the speed and is ignored.
 void lower_priority();
 
-// Processor time of the calling thread in ms: the time in which others run does not count.
+// Processor time of the calling thread in ms. Time in which other threads run is not included.
 double thread_ms();
 
 }  // namespace bslam::web_server

@@ -33,7 +33,7 @@ def key_of(value: Any) -> str:
 def cached(cache: str, stage: str, depends_on: Any, make: Callable[[pathlib.Path], Result]) -> Result:
     """The result of `make`, which writes files into the folder it is given, or that of an earlier call.
 
-    The folder appears under its name when it is complete. `folder` and `computed` are added to the result.
+    The folder is renamed to its final name when it is complete. `folder` and `computed` are added to the result.
     """
     folder = pathlib.Path(cache, stage, key_of([stage, depends_on]))
     computed = not folder.exists()
@@ -55,8 +55,8 @@ def cached(cache: str, stage: str, depends_on: Any, make: Callable[[pathlib.Path
 def content_of(cache: str, recording: str) -> str:
     """Hash of the content of a recording.
 
-    Files on disk are read again only if a size or a time has changed. Of object stores, the listing identifies the
-    content.
+    Files on disk are only read again if a size or modification time has changed. In object stores, the listing
+    identifies the content.
     """
     system, root = fsspec.url_to_fs(recording)
     local = isinstance(system, LocalFileSystem)
@@ -75,7 +75,7 @@ def content_of(cache: str, recording: str) -> str:
 
 
 def local_copy(recording: str, folder: pathlib.Path) -> str:
-    """The path of a recording, which is fetched into `folder` unless it is on disk."""
+    """The path of a recording, which is downloaded into `folder` unless it is on disk."""
     system, root = fsspec.url_to_fs(recording)
     if isinstance(system, LocalFileSystem):
         return root

@@ -1,4 +1,4 @@
-"""From recordings to the map of a site: what depends on what. Dask decides when and where it runs."""
+"""From recordings to the map of a site: the graph of tasks. Dask decides when and where each task runs."""
 
 from __future__ import annotations
 
@@ -26,20 +26,20 @@ from ._sketch import likely_pairs
 Path = Union[str, "os.PathLike[str]"]
 
 _FAN_IN = 5  # maps that are merged at once
-_NUMBERS = ("keyframes", "landmarks")  # of a map
+_NUMBERS = ("keyframes", "landmarks")  # sizes of a map
 
 
 @dataclass
 class Recording:
-    """A recording and what became of it.
+    """A recording and its result.
 
     Attributes:
-        name: of its files.
-        data: where it is.
+        name: name of its output files.
+        data: path or address of the recording.
         state: joined to the map of a site; apart, with a map of its own; or failed.
         reason: why it was not joined.
-        map: file, relative to the folder of the result.
-        trajectory: file of its trajectory in that map.
+        map: map file, relative to the folder of the result.
+        trajectory: file with its trajectory in that map.
     """
 
     name: str
@@ -55,12 +55,12 @@ class Site:
     """The result of map_recordings.
 
     Attributes:
-        folder: of all files.
-        sites: the maps of two or more recordings, the one of most recordings first: file, recordings, keyframes,
-            landmarks.
+        folder: folder of all output files.
+        sites: the maps of two or more recordings, the one with most recordings first; keys: map, recordings,
+            keyframes, landmarks.
         recordings: all recordings, in order of name.
         computed: number of tasks that were computed.
-        reused: number of tasks whose results were there already.
+        reused: number of tasks whose results were already in the cache.
     """
 
     folder: pathlib.Path
@@ -70,7 +70,7 @@ class Site:
     reused: int = 0
 
     def lines(self) -> list[str]:
-        """What the command line prints."""
+        """The lines that the command line prints."""
         out = [f"{r.state}: {r.name}: {r.reason}" for r in self.recordings if r.state != "joined"]
         for site in self.sites:
             out.append(
@@ -99,7 +99,7 @@ def map_recordings(
 
     Args:
         recordings: folders and bags, or addresses that fsspec knows, such as s3://BUCKET/NAME.
-        out: folder for site.bmap, trajectories, and site.json, which says what became of each recording.
+        out: folder for site.bmap, trajectories, and site.json, which lists the result of each recording.
         client: Dask client to use.
         scheduler: address of a Dask scheduler; its workers must see `cache` and the recordings under the same paths.
         workers: number of local workers without `client` and `scheduler`; default: one per core.
@@ -109,7 +109,7 @@ def map_recordings(
         config: YAML file with settings.
         settings: settings such as "features.per_image=800".
         partners: number of other recordings that each one is compared with.
-        overwrite: `out` may contain files of others.
+        overwrite: `out` may contain other files.
         progress: show progress on stderr.
 
     Raises:
@@ -170,7 +170,7 @@ def _options(
 def _connected(client: Client | None, scheduler: str | None, workers: int | None, progress: bool) -> Iterator[Client]:
     with contextlib.ExitStack() as stack:
         if client is None:
-            # A worker that is killed says nothing about its task, which is tried again by another one.
+            # If a worker is killed, its task is probably not the cause; another worker tries it again.
             stack.enter_context(dask.config.set({"distributed.scheduler.allowed-failures": 100}))
             address: Any = scheduler
             if address is None:
@@ -194,8 +194,8 @@ class _Mapping:
     def __init__(self, client: Client, setup: _tasks.Setup, out: pathlib.Path, partners: int, progress: bool) -> None:
         self.client, self.setup, self.partners, self.progress = client, setup, partners, progress
         self.site = Site(out)
-        self.verdicts: dict[tuple[str, str], bool] = {}  # whether the maps of a pair have a place in common
-        self.reasons: dict[str, str] = {}  # of maps that have none with another one
+        self.verdicts: dict[tuple[str, str], bool] = {}  # whether the maps of a pair share a place
+        self.reasons: dict[str, str] = {}  # by hash of a map: why it shares no place with another map
 
     def run(self, recordings: list[Recording]) -> Site:
         self.site.recordings = recordings
@@ -232,14 +232,14 @@ class _Mapping:
         return results
 
     def _merged(self, maps: dict[str, Result]) -> list[tuple[Result, tuple[str, ...]]]:
-        """The maps of the sites, each with the hashes of the maps in it; the one of most maps first.
+        """The maps of the sites, each with the hashes of the maps in it; the one with most maps first.
 
-        In each round, every site is compared with others at its likeliest pair of maps, and sites that have a place in
-        common are merged.
+        In each round, the most similar pair of maps that connects a site with another site is compared, for every
+        site. Sites that share a place are merged.
         """
         pairs = self._likely_pairs(maps)
-        site: dict[str, tuple[str, ...]] = {key: (key,) for key in maps}  # of each map: all maps of its site
-        merged: dict[tuple[str, ...], Any] = {(key,): maps[key] for key in maps}  # of each site
+        site: dict[str, tuple[str, ...]] = {key: (key,) for key in maps}  # by map: all maps of its site
+        merged: dict[tuple[str, ...], Any] = {(key,): maps[key] for key in maps}  # by site: its merged map
         merges = []
         while chosen := _best_pairs(pairs, site):
             self._compare([pair for pair in chosen if pair not in self.verdicts], maps)
@@ -310,13 +310,13 @@ class _Mapping:
 
 
 def _best_pairs(pairs: list[tuple[str, str]], site: dict[str, tuple[str, ...]]) -> list[tuple[str, str]]:
-    """Of each site the first pair in the list that connects it with another one."""
+    """For each site the first pair in the list that connects it with another site."""
     best: dict[tuple[str, ...], tuple[str, str]] = {}
     for a, b in pairs:
         if site[a] != site[b]:
             best.setdefault(site[a], (a, b))
             best.setdefault(site[b], (a, b))
-    return list(dict.fromkeys(best.values()))  # in the order of the list, which another recording hardly changes
+    return list(dict.fromkeys(best.values()))  # in the order of the list; one more recording hardly changes it
 
 
 def _join(pairs: list[tuple[str, str]], site: dict[str, tuple[str, ...]]) -> None:

@@ -25,7 +25,7 @@ _NOTHING_TRACKED = 3  # exit status
 
 @dataclass(frozen=True)
 class Setup:
-    """What all tasks have in common."""
+    """The input that is common to all tasks."""
 
     cache: str  # folder
     program: str  # hash
@@ -92,7 +92,7 @@ def make_map(setup: Setup, recording: str) -> Result:
 
 
 def compare(setup: Setup, a: Result, b: Result) -> Result:
-    """Whether two maps have a place in common: `joined`, or the `reason` why not."""
+    """Tests whether two maps share a place: `joined`, or the `reason` why not."""
     setup.check()
 
     def make(_: pathlib.Path) -> Result:
@@ -143,7 +143,7 @@ def _program(*arguments: str) -> str:
 
 
 def _run(*arguments: str) -> subprocess.CompletedProcess[str]:
-    """Runs the program, which ends with the worker."""
+    """Runs the program, which is killed if the worker ends."""
     done = subprocess.run([PROGRAM, *arguments], capture_output=True, text=True, check=False, preexec_fn=_end_together)
     if done.returncode < 0:  # Dask tries again
         raise RuntimeError(f"bslam {arguments[0]} was ended by signal {-done.returncode}")
