@@ -16,6 +16,11 @@ FileDescriptor::~FileDescriptor() {
 
 FileDescriptor::FileDescriptor(FileDescriptor&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
 
+FileDescriptor& FileDescriptor::operator=(FileDescriptor&& other) noexcept {
+  std::swap(fd_, other.fd_);
+  return *this;
+}
+
 bool FileDescriptor::close() { return ::close(std::exchange(fd_, -1)) == 0; }
 
 Error system_error(std::string_view attempt, const std::filesystem::path& path, std::string expected) {

@@ -13,10 +13,10 @@ namespace bslam {
 // Owns a file descriptor; -1 if there is none.
 class FileDescriptor {
  public:
-  explicit FileDescriptor(int fd) : fd_(fd) {}
+  explicit FileDescriptor(int fd = -1) : fd_(fd) {}
   ~FileDescriptor();
   FileDescriptor(FileDescriptor&& other) noexcept;
-  FileDescriptor& operator=(FileDescriptor&&) = delete;
+  FileDescriptor& operator=(FileDescriptor&& other) noexcept;
 
   int get() const { return fd_; }
   bool close();  // false if the system reports an error

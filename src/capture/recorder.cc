@@ -135,11 +135,12 @@ void Recorder::write_frames() {
 Status Recorder::finish() {
   {
     const std::lock_guard lock(mutex_);
-    if (ending_) return status_;
     ending_ = true;
     changed_.notify_all();
   }
+  if (!thread_.joinable()) return status_;  // finished before
   thread_.join();
+  const std::lock_guard lock(mutex_);
   if (status_) status_ = file_->finish();
   bytes_ = file_->bytes();
   return status_;

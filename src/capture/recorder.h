@@ -37,7 +37,7 @@ class Recorder {
   // was room. After an error frames are not recorded any more.
   bool add(const ImageBundle& frame, const std::stop_token& stop = {});
 
-  // Writes what is left and ends the file. Error: it could not be written completely.
+  // Writes what is left and ends the file. To be called from one thread. Error: it could not be written completely.
   Status finish();
 
   // Amount of data written; final after finish().

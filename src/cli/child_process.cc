@@ -28,6 +28,32 @@ ProcessEnd wait_for(pid_t process, const std::stop_token& stop) {
   return {.exit_status = WEXITSTATUS(status), .signal = 0};
 }
 
+// What a started process reads and writes: nothing, and the file `log`.
+class FileActions {
+ public:
+  explicit FileActions(const std::filesystem::path& log) : failure_(::posix_spawn_file_actions_init(&actions_)) {
+    constexpr int kToWrite = O_WRONLY | O_CREAT | O_TRUNC;
+    initialised_ = failure_ == 0;
+    if (failure_ == 0) failure_ = ::posix_spawn_file_actions_addopen(&actions_, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+    if (failure_ == 0)
+      failure_ = ::posix_spawn_file_actions_addopen(&actions_, STDOUT_FILENO, log.c_str(), kToWrite, 0644);
+    if (failure_ == 0) failure_ = ::posix_spawn_file_actions_adddup2(&actions_, STDOUT_FILENO, STDERR_FILENO);
+  }
+  ~FileActions() {
+    if (initialised_) ::posix_spawn_file_actions_destroy(&actions_);
+  }
+  FileActions(const FileActions&) = delete;
+  FileActions& operator=(const FileActions&) = delete;
+
+  int failure() const { return failure_; }  // an error number; 0 if the actions are complete
+  const posix_spawn_file_actions_t* get() const { return &actions_; }
+
+ private:
+  posix_spawn_file_actions_t actions_{};
+  int failure_ = 0;
+  bool initialised_ = false;
+};
+
 }  // namespace
 
 Result<ProcessEnd> run_program(const std::string& program, const std::vector<std::string>& arguments,
@@ -37,14 +63,13 @@ Result<ProcessEnd> run_program(const std::string& program, const std::vector<std
   std::vector<char*> argv{name.data()};
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
-  posix_spawn_file_actions_t files;
-  ::posix_spawn_file_actions_init(&files);
-  ::posix_spawn_file_actions_addopen(&files, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-  ::posix_spawn_file_actions_addopen(&files, STDOUT_FILENO, log.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644);
-  ::posix_spawn_file_actions_adddup2(&files, STDOUT_FILENO, STDERR_FILENO);
   pid_t process = 0;
-  const int failure = ::posix_spawnp(&process, program.c_str(), &files, nullptr, argv.data(), environ);
-  ::posix_spawn_file_actions_destroy(&files);
+  int failure = 0;
+  {
+    const FileActions files(log);
+    failure = files.failure();
+    if (failure == 0) failure = ::posix_spawnp(&process, program.c_str(), files.get(), nullptr, argv.data(), environ);
+  }
   if (failure != 0) return Error{log.string(), "", std::strerror(failure), "a process that can be started"};
   return wait_for(process, stop);
 }

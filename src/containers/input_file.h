@@ -6,17 +6,13 @@
 #include <filesystem>
 #include <string>
 
+#include "base/file_descriptor.h"
 #include "base/result.h"
 
 namespace bslam::containers {
 
 class InputFile {
  public:
-  InputFile() = default;
-  InputFile(InputFile&& other) noexcept;
-  InputFile& operator=(InputFile&& other) noexcept;
-  ~InputFile();
-
   // Errors: the file cannot be opened or is not a regular file.
   static Result<InputFile> open(const std::filesystem::path& path);
 
@@ -30,7 +26,7 @@ class InputFile {
  private:
   std::filesystem::path path_;
   std::uint64_t size_ = 0;
-  int descriptor_ = -1;
+  FileDescriptor file_;
 };
 
 }  // namespace bslam::containers

@@ -154,8 +154,8 @@ void McapFile::read_summary() {
   constexpr std::uint64_t kFooterSize = kHead + 20, kEnd = kFooterSize + kMagic.size();
   const std::uint64_t size = file().size();
   if (size < kMagic.size() + kEnd || file().read(size - kMagic.size(), kMagic.size()) != kMagic) {
-    warnings_.push_back(
-        fmt::format("{}: no index, since the recording was not finished; it is read without", path_.string()));
+    warnings_.push_back(fmt::format(
+        "{}: no index, because the recording was not finished; the whole file is read instead", path_.string()));
     return;
   }
   const auto footer = record_at(0, size - kEnd);
@@ -177,7 +177,8 @@ void McapFile::read_summary() {
   }
   std::ranges::sort(chunk_positions_);
   has_summary_ = at == size - kEnd && !topic_of_.empty();
-  if (at != size - kEnd) warnings_.push_back(fmt::format("{}: damaged index; it is read without", path_.string()));
+  if (at != size - kEnd)
+    warnings_.push_back(fmt::format("{}: damaged index; the whole file is read instead", path_.string()));
 }
 
 void McapFile::add_record(std::uint32_t chunk, std::uint64_t at, const Record& record) {

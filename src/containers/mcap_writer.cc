@@ -53,9 +53,9 @@ std::string compressed(std::string_view bytes) {
 }  // namespace
 
 Result<std::unique_ptr<McapWriter>> McapWriter::create(const std::filesystem::path& path) {
-  const int descriptor = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-  if (descriptor < 0) return Error{path.string(), "", std::strerror(errno), "a file that can be written"};
-  std::unique_ptr<McapWriter> writer(new McapWriter(path, descriptor));
+  FileDescriptor file(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));
+  if (file.get() < 0) return Error{path.string(), "", std::strerror(errno), "a file that can be written"};
+  std::unique_ptr<McapWriter> writer(new McapWriter(path, std::move(file)));
   std::string header;
   append_text(header, "ros2");
   append_text(header, "bslam");
@@ -64,14 +64,13 @@ Result<std::unique_ptr<McapWriter>> McapWriter::create(const std::filesystem::pa
 }
 
 McapWriter::~McapWriter() {
-  if (descriptor_ < 0) return;
+  if (file_.get() < 0) return;
   [[maybe_unused]] const Status last = flush();
-  ::close(descriptor_);
 }
 
 Status McapWriter::put(std::string_view bytes) {
   while (failure_ && !bytes.empty()) {
-    const ssize_t written = ::write(descriptor_, bytes.data(), bytes.size());
+    const ssize_t written = ::write(file_.get(), bytes.data(), bytes.size());
     if (written < 0 && errno == EINTR) continue;
     if (written <= 0) {
       failure_ =
@@ -245,8 +244,8 @@ Status McapWriter::finish() {
   append(footer, std::uint64_t{0});  // no offsets of the parts of the summary
   append(footer, std::uint32_t{0});  // no checksum
   const Status written = put(summary + record(kFooter, footer) + std::string(kMagic));
-  const int failed = ::close(std::exchange(descriptor_, -1));
-  if (written && failed != 0) return Error{path_.string(), "", std::strerror(errno), "room for the recording"};
+  const bool closed = file_.close();
+  if (written && !closed) return Error{path_.string(), "", std::strerror(errno), "room for the recording"};
   return written;
 }
 

@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/file_descriptor.h"
 #include "base/result.h"
 #include "base/timestamp.h"
 
@@ -56,14 +57,14 @@ class McapWriter {
     std::uint64_t first_ns = 0, last_ns = 0;     // times of its messages
   };
 
-  McapWriter(std::filesystem::path path, int descriptor) : path_(std::move(path)), descriptor_(descriptor) {}
+  McapWriter(std::filesystem::path path, FileDescriptor file) : path_(std::move(path)), file_(std::move(file)) {}
   Status put(std::string_view bytes);
   std::string schema_record(std::size_t number) const;
   std::string channel_record(std::size_t number) const;
   std::string statistics() const;
 
   const std::filesystem::path path_;
-  int descriptor_ = -1;
+  FileDescriptor file_;
   std::uint64_t at_ = 0;
   Status failure_;
   std::vector<Channel> channels_;

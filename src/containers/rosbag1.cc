@@ -130,8 +130,8 @@ void RosBag1::read_index_section(const Record& bag_header) {
   const auto connections = number<std::uint32_t>(bag_header.fields, "conn_count");
   expected_chunks_ = number<std::uint32_t>(bag_header.fields, "chunk_count").value_or(0);
   if (!at || *at == 0) {
-    warnings_.push_back(
-        fmt::format("{}: no index, since the recording was not finished; it is read without", path_.string()));
+    warnings_.push_back(fmt::format(
+        "{}: no index, because the recording was not finished; the whole file is read instead", path_.string()));
     return;
   }
   std::uint64_t here = *at;
@@ -145,7 +145,8 @@ void RosBag1::read_index_section(const Record& bag_header) {
   }
   std::ranges::sort(chunk_positions_);
   has_index_ = connections && topic_of_.size() >= *connections && here == file().size();
-  if (!has_index_) warnings_.push_back(fmt::format("{}: damaged or missing index; it is read without", path_.string()));
+  if (!has_index_)
+    warnings_.push_back(fmt::format("{}: damaged or missing index; the whole file is read instead", path_.string()));
 }
 
 // Returns false if the chunk has an unknown compression.

@@ -61,7 +61,11 @@ class MapService::Implementation final : public web_server::RequestHandler {
  public:
   Implementation(const ServiceOptions& options, std::shared_ptr<const system::Localiser> localiser,
                  std::string map_json)
-      : options_(options), localiser_(std::move(localiser)), map_json_(std::move(map_json)), queue_(options.queue) {}
+      : options_(options),
+        loopback_(web_server::is_loopback(options.server.address)),
+        localiser_(std::move(localiser)),
+        map_json_(std::move(map_json)),
+        queue_(options.queue) {}
 
   ~Implementation() override {
     queue_.close();
@@ -70,7 +74,6 @@ class MapService::Implementation final : public web_server::RequestHandler {
   }
 
   Status start() {
-    loopback_ = options_.server.address.starts_with("127.") || options_.server.address == "::1";
     auto server = web_server::HttpServer::start(options_.server, limits_of(options_), *this);
     if (!server) return server.error();
     server_ = *std::move(server);
@@ -168,9 +171,9 @@ class MapService::Implementation final : public web_server::RequestHandler {
   }
 
   const ServiceOptions options_;
+  const bool loopback_;
   const std::shared_ptr<const system::Localiser> localiser_;
   const std::string map_json_;
-  bool loopback_ = true;
   Metrics metrics_;
   std::unique_ptr<web_server::HttpServer> server_;
   BoundedQueue<Job> queue_;

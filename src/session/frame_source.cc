@@ -3,29 +3,15 @@
 #include <algorithm>
 #include <utility>
 
-#if defined(__linux__)
-#include <sys/resource.h>
-#endif
-
 #include "base/stopwatch.h"
+#include "base/this_thread.h"
 
 namespace bslam::session {
-namespace {
-
-// On Linux the nice value applies to the calling thread only. A failure only affects the speed and is ignored.
-void lower_priority() {
-#if defined(__linux__)
-  constexpr int kNice = 10;
-  [[maybe_unused]] const int failed = setpriority(PRIO_PROCESS, 0, kNice);
-#endif
-}
-
-}  // namespace
 
 DatasetFrames::DatasetFrames(const dataset::Dataset& dataset, std::size_t ahead, ReaderPriority priority,
                              std::function<bool(TimeNs, TimeNs)> skips)
     : dataset_(dataset), ahead_(ahead), skips_(std::move(skips)), reader_([this, priority](std::stop_token stop) {
-        if (priority == ReaderPriority::kLow) lower_priority();
+        if (priority == ReaderPriority::kLow) lower_thread_priority();
         read(std::move(stop));
       }) {}
 

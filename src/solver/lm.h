@@ -51,7 +51,9 @@ concept LeastSquaresProblem = requires(P p, double damping) {
   // the quadratic model predicts, or nullopt if the system cannot be solved.
   { p.solve(damping) } -> std::same_as<std::optional<double>>;
   { p.trial_cost() } -> std::same_as<double>;
-  p.accept();  // the trial values become the current ones
+  // The trial values become the current ones. After a Gauss-Newton step that ends the loop, trial_cost() was not
+  // called.
+  p.accept();
 };
 
 class Damping {

@@ -5,6 +5,7 @@
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
 #include <boost/beast/websocket/rfc6455.hpp>
+#include <chrono>
 
 namespace bslam::web_server {
 
@@ -19,7 +20,8 @@ namespace {
 constexpr std::uint32_t kMaxHeader = 16 * 1024;
 constexpr auto kResponseTime = std::chrono::seconds(30);
 constexpr auto kDrainTime = std::chrono::seconds(5);
-constexpr int kSendBuffer = 256 * 1024;  // bytes; a larger buffer would only delay the newest update
+constexpr std::chrono::milliseconds kRetryAfter{100};  // after a connection could not be accepted
+constexpr int kSendBuffer = 256 * 1024;                // bytes; a larger buffer would only delay the newest update
 
 std::string_view view(beast::string_view text) { return {text.data(), text.size()}; }
 
@@ -176,7 +178,7 @@ Status Connections::listen(const ServerOptions& options) {
   ErrorCode error;
   const asio::ip::address address = asio::ip::make_address(options.address, error);
   if (error) return Error{"web server", "address", options.address, "an IP address of this machine, such as 0.0.0.0"};
-  loopback_ = address.is_loopback();
+  loopback_ = is_loopback(options.address);
   error = open({address, options.port});
   if (error == asio::error::address_in_use && options.or_any_port) error = open({address, 0});
   const std::string port = "port " + std::to_string(options.port);
@@ -214,13 +216,23 @@ void Connections::accept() {
       Slot slot(this, [](Connections* all) { --all->open_; });
       std::make_shared<Connection>(*this, std::move(socket), std::move(slot))->read();
     }
+    // A lack of file descriptors or memory lasts; trying again at once would keep the thread busy.
+    if (error) return accept_later();
     accept();
+  });
+}
+
+void Connections::accept_later() {
+  retry_.expires_after(kRetryAfter);
+  retry_.async_wait([this](ErrorCode error) {
+    if (!error && acceptor_.is_open()) accept();
   });
 }
 
 void Connections::close() {
   ErrorCode ignored;
   acceptor_.close(ignored);
+  retry_.cancel();
 }
 
 void Connections::when_idle(std::function<void()> idle) {

@@ -3,6 +3,7 @@
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/steady_timer.hpp>
 #include <boost/beast/http/message.hpp>
 #include <boost/beast/http/string_body.hpp>
 #include <functional>
@@ -43,6 +44,7 @@ class Connections {
   friend class Connection;
   boost::system::error_code open(const boost::asio::ip::tcp::endpoint& endpoint);
   void accept();
+  void accept_later();
   void answer_begins() { ++answering_; }
   void answer_ends();
 
@@ -58,6 +60,7 @@ class Connections {
   // Declared after the members that connections use, because its destructor destroys the connections.
   boost::asio::io_context context_{1};
   boost::asio::ip::tcp::acceptor acceptor_{context_};
+  boost::asio::steady_timer retry_{context_};
 };
 
 }  // namespace bslam::web_server

@@ -1,6 +1,7 @@
 #include "web_server/http_server.h"
 
 #include <boost/asio/executor_work_guard.hpp>
+#include <boost/asio/ip/address.hpp>
 #include <boost/asio/post.hpp>
 #include <future>
 #include <thread>
@@ -10,6 +11,12 @@
 namespace bslam::web_server {
 
 void RequestHandler::answered(const RequestHead&, int) {}
+
+bool is_loopback(const std::string& address) {
+  boost::system::error_code error;
+  const auto parsed = boost::asio::ip::make_address(address, error);
+  return !error && parsed.is_loopback();
+}
 
 class HttpServer::Implementation {
  public:

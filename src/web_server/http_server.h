@@ -23,6 +23,9 @@ struct ServerOptions {
   bool or_any_port = false;           // if the port is in use, any free one is taken
 };
 
+// Returns true for an IP address that only programs on this machine can reach, such as 127.0.0.1.
+bool is_loopback(const std::string& address);
+
 struct HttpLimits {
   std::size_t connections = 16;  // further ones are closed at once
   std::uint64_t body_bytes = 0;  // maximum of one request; a longer one is answered with 413

@@ -13,9 +13,9 @@
 #include <thread>
 #include <utility>
 
+#include "base/this_thread.h"
 #include "web_server/http_connection.h"
 #include "web_server/request_check.h"
-#include "web_server/server_thread.h"
 
 namespace bslam::web_server {
 namespace {
@@ -207,7 +207,7 @@ class Server::Implementation final : public RequestHandler {
 
  private:
   void run() {
-    lower_priority();
+    lower_thread_priority();
     try {
       connections_.context().run();
     } catch (const std::exception&) {  // such as a lack of memory: whoever has a server does not depend on it

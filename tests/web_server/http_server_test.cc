@@ -3,14 +3,19 @@
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
 #include <netinet/in.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
+#include <ctime>
 #include <mutex>
+#include <optional>
 #include <thread>
 #include <utility>
+#include <vector>
 
 namespace bslam::web_server {
 namespace {
@@ -18,7 +23,8 @@ namespace {
 // A connection to a server of this machine.
 class Client {
  public:
-  explicit Client(const std::string& url) : socket_(::socket(AF_INET, SOCK_STREAM, 0)) {
+  explicit Client(const std::string& url) : Client(url, ::socket(AF_INET, SOCK_STREAM, 0)) {}
+  Client(const std::string& url, int socket) : socket_(socket) {
     sockaddr_in address{};
     address.sin_family = AF_INET;
     address.sin_port = htons(static_cast<std::uint16_t>(std::stoi(url.substr(url.rfind(':') + 1))));
@@ -103,6 +109,55 @@ TEST(HttpServer, AnotherThreadAnswersAWholeRequest) {
   EXPECT_TRUE(begins(answer, "200")) << answer;
   EXPECT_NE(answer.find("\r\nX-Y: z\r\n"), std::string::npos) << answer;
   EXPECT_TRUE(answer.ends_with("\r\n\r\ntext")) << answer;
+}
+
+// Takes all file descriptors that this process may open.
+class NoFileDescriptors {
+ public:
+  NoFileDescriptors() {
+    EXPECT_EQ(::getrlimit(RLIMIT_NOFILE, &before_), 0);
+    const int lowest = ::dup(0);  // the lowest free number
+    files_.push_back(lowest);
+    const rlimit few{static_cast<rlim_t>(lowest) + 50, before_.rlim_max};
+    EXPECT_EQ(::setrlimit(RLIMIT_NOFILE, &few), 0);
+    for (int file = 0; (file = ::dup(0)) >= 0;) files_.push_back(file);
+  }
+  ~NoFileDescriptors() {
+    ::setrlimit(RLIMIT_NOFILE, &before_);
+    for (const int file : files_) ::close(file);
+  }
+  NoFileDescriptors(const NoFileDescriptors&) = delete;
+  NoFileDescriptors& operator=(const NoFileDescriptors&) = delete;
+
+ private:
+  rlimit before_{};
+  std::vector<int> files_;
+};
+
+double process_ms() {
+  timespec now{};
+  ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
+}
+
+TEST(HttpServer, WaitsWhereNoFileDescriptorIsLeft) {
+  Recorder recorder;
+  const auto server = start(recorder);
+  std::optional<Client> client;
+  {
+    const int socket = ::socket(AF_INET, SOCK_STREAM, 0);
+    const NoFileDescriptors none;
+    client.emplace(server->url(), socket);
+    client->post("text", 4);
+    const double before_ms = process_ms();
+    std::this_thread::sleep_for(std::chrono::milliseconds(400));
+    EXPECT_LT(process_ms() - before_ms, 100.0) << "processor time while nothing can be accepted";
+  }
+  auto accepted = recorder.accepted();
+  EXPECT_EQ(accepted.first, "/a text");
+  accepted.second({200, ""});
+  accepted.second = {};
+  EXPECT_TRUE(begins(client->answer(), "200"));
 }
 
 TEST(HttpServer, BodiesAreInvitedWhereClientsWaitForThat) {

@@ -1,4 +1,4 @@
-#include "web_server/server_thread.h"
+#include "base/this_thread.h"
 
 #include <ctime>
 
@@ -6,10 +6,10 @@
 #include <sys/resource.h>
 #endif
 
-namespace bslam::web_server {
+namespace bslam {
 
 // On Linux the nice value applies to the calling thread only.
-void lower_priority() {
+void lower_thread_priority() {
 #if defined(__linux__)
   constexpr int kNice = 10;
   [[maybe_unused]] const int failed = setpriority(PRIO_PROCESS, 0, kNice);
@@ -22,4 +22,4 @@ double thread_ms() {
   return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
 }
 
-}  // namespace bslam::web_server
+}  // namespace bslam
