@@ -27,12 +27,15 @@ namespace {
 
 constexpr std::size_t kFirstCalibration = 8, kSecondCalibration = 12;  // keyframes
 
+// The number of keyframes at which the next calibration is due. Each further quarter of observations makes the
+// estimate of a wrong calibration, and so the poses of the following frames, noticeably more accurate.
+std::size_t next_calibration(std::size_t due) { return due < kSecondCalibration ? kSecondCalibration : due + due / 4; }
+
 }  // namespace
 
 std::optional<int> calibration_due(KeyframeId keyframe) {
-  static_assert(kSecondCalibration == kFirstCalibration + kFirstCalibration / 2);
   int number = 0;
-  for (std::size_t due = kFirstCalibration; due <= keyframe.index(); due += due / 2, ++number) {
+  for (std::size_t due = kFirstCalibration; due <= keyframe.index(); due = next_calibration(due), ++number) {
     if (due == keyframe.index()) return number;
   }
   return std::nullopt;
@@ -41,7 +44,7 @@ std::optional<int> calibration_due(KeyframeId keyframe) {
 bool before_first_calibration(KeyframeId keyframe) { return keyframe.index() <= kFirstCalibration; }
 
 bool awaited(const StageTask& task, const map::BundledMap& newest) {
-  constexpr int kVerdicts = 2, kRefinements = 5;  // calibrations
+  constexpr int kVerdicts = 2, kRefinements = 8;  // calibrations
   switch (task.stage) {
     case Stage::kKeyframe:
     case Stage::kMap:

@@ -36,14 +36,14 @@ std::shared_ptr<const Eigen::MatrixXd> rig_prior(const calibration::CalibrationO
 }
 
 // Returns true if a calibration that is due can be skipped. Images that contradict the calibration already do so in the
-// first estimates. If the first ones agree with it, every second one of the following is sufficient. A map that was
+// first estimates. If the first ones agree with it, every fourth one of the following is sufficient. A map that was
 // loaded, or whose scale had to be estimated, may have had no estimate yet.
 bool left_out(const calibration::CalibrationOptions& options, const map::BundledMap& map, const camera::Rig& calibrated,
               KeyframeId first, KeyframeId keyframe) {
   if (options.refine == calibration::Refine::kTrue || calibration::replaced(map.rig(), calibrated)) return false;
   if (first.index() > 0 || map.scale_deviation() > 0) return false;
   const int number = execution::calibration_due(keyframe).value_or(0);
-  return number >= 2 && number % 2 == 0;
+  return number >= 2 && number % 4 != 1;
 }
 
 // Replaces the rig by its estimate from the map so far, and adjusts the map with it. The newest keyframe keeps its
