@@ -1,7 +1,7 @@
 #include "looping/place_recogniser.h"
 
 #include <algorithm>
-#include <limits>
+#include <optional>
 #include <span>
 
 #include "base/cores.h"
@@ -15,31 +15,80 @@ namespace {
 constexpr std::size_t kManyKeyframes = 256;
 constexpr int kMaxThreads = 8;
 
-struct Scored {
-  KeyframeId keyframe;
-  double score = 0;
-};
-
-bool better(const Candidate& a, const Candidate& b) {
-  return a.score != b.score ? a.score > b.score : a.keyframe < b.keyframe;
-}
-
-// Adds the scores of the best covisible keyframes of `at` that have one and share at least `weight` landmarks with it.
-// `scores`: by keyframe, negative for those without. The group is represented by its highest-scoring keyframe.
-Candidate group_of(const map::BundledMap& map, const Scored& at, std::span<const double> scores, int size, int weight) {
-  Candidate group{at.keyframe, at.score};
-  double best = at.score;
-  for (const map::Covisible& c : map.best_covisible(at.keyframe, static_cast<std::size_t>(size), weight)) {
-    const double score = scores[c.keyframe.index()];
-    if (score < 0) continue;
-    group.score += score;
-    if (score > best) {
-      best = score;
-      group.keyframe = c.keyframe;
+// Keyframes with scores, and the scores of their groups. The group of a keyframe consists of it and of the best `size`
+// covisible keyframes that have a score and share at least `weight` landmarks with it.
+class Groups {
+ public:
+  // `scores`: by keyframe, negative for those without.
+  Groups(const map::BundledMap& map, std::span<const double> scores, int size, int weight)
+      : map_(map), scores_(scores), size_(static_cast<std::size_t>(size)), weight_(weight) {
+    for (std::size_t k = 0; k < scores.size(); ++k) {
+      if (scores[k] >= 0) next_.push_back({KeyframeId(k), bound(KeyframeId(k)), false});
     }
+    std::ranges::make_heap(next_, later);
   }
-  return group;
-}
+
+  // Returns the groups by decreasing score, one per call; nullopt after the last one. Only scores that can be the next
+  // highest are computed.
+  std::optional<Candidate> next() {
+    while (!next_.empty()) {
+      std::ranges::pop_heap(next_, later);
+      Group& top = next_.back();
+      if (top.final) {
+        const Candidate out{top.keyframe, top.score};
+        next_.pop_back();
+        return out;
+      }
+      top = group_of(top.keyframe);
+      std::ranges::push_heap(next_, later);
+    }
+    return std::nullopt;
+  }
+
+ private:
+  struct Group {
+    KeyframeId keyframe;
+    double score = 0;    // an upper bound if not final
+    bool final = false;  // the keyframe is then that of the group with the highest score
+  };
+
+  static bool later(const Group& a, const Group& b) {
+    if (a.score != b.score) return a.score < b.score;
+    return a.final != b.final ? a.final : b.keyframe < a.keyframe;
+  }
+
+  double bound(KeyframeId k) const {
+    constexpr double kRounding = 1.0 + 1e-12;  // the scores of a group are added up one by one
+    double highest = 0, sum = 0;
+    for (const map::Covisible& c : map_.keyframe(k).covisible) {
+      const double score = c.weight >= weight_ ? std::max(0.0, scores_[c.keyframe.index()]) : 0.0;
+      highest = std::max(highest, score);
+      sum += score;
+    }
+    return kRounding * (scores_[k.index()] + std::min(sum, static_cast<double>(size_) * highest));
+  }
+
+  Group group_of(KeyframeId k) const {
+    double best = scores_[k.index()];
+    Group group{k, best, true};
+    for (const map::Covisible& c : map_.best_covisible(k, size_, weight_)) {
+      const double score = scores_[c.keyframe.index()];
+      if (score < 0) continue;
+      group.score += score;
+      if (score > best) {
+        best = score;
+        group.keyframe = c.keyframe;
+      }
+    }
+    return group;
+  }
+
+  const map::BundledMap& map_;
+  const std::span<const double> scores_;
+  const std::size_t size_;
+  const int weight_;
+  std::vector<Group> next_;  // a heap
+};
 
 }  // namespace
 
@@ -138,30 +187,23 @@ std::vector<Candidate> BagOfWordsRecogniser::rank(const map::BundledMap& map, co
                 [&](const place::CommonWords& c) { return !excluded.empty() && excluded[c.keyframe.index()]; });
   int most = 0;
   for (const place::CommonWords& c : sharing) most = std::max(most, c.count);
-  std::vector<Scored> scored;
   std::vector<double> scores(map.keyframe_slots(), -1.0);
   for (const place::CommonWords& c : sharing) {
-    if (c.count < bounds.min_common_word_ratio * most) continue;
-    if (c.score < bounds.min_score) continue;
-    scored.push_back({c.keyframe, c.score});
-    scores[c.keyframe.index()] = c.score;
+    if (c.count >= bounds.min_common_word_ratio * most && c.score >= bounds.min_score)
+      scores[c.keyframe.index()] = c.score;
   }
-  std::vector<Candidate> groups;
-  for (const Scored& s : scored)
-    groups.push_back(group_of(map, s, scores, options_.group, options_.min_neighbour_landmarks));
-  std::sort(groups.begin(), groups.end(), better);
+  Groups groups(map, scores, options_.group, options_.min_neighbour_landmarks);
   std::vector<Candidate> out;
   // A group covers its representative and the neighbours of the representative. Keyframes that share only a few
   // landmarks, for example through a door, count as different places.
   std::vector<std::uint8_t> taken(map.keyframe_slots(), 0);
-  for (const Candidate& g : groups) {
-    if (out.size() == static_cast<std::size_t>(options_.max_candidates) ||
-        g.score < bounds.min_group_score_ratio * groups.front().score)
-      break;
-    if (taken[g.keyframe.index()]) continue;
-    out.push_back(g);
-    taken[g.keyframe.index()] = 1;
-    for (const map::Covisible& c : neighbours_of(map, g.keyframe, options_)) taken[c.keyframe.index()] = 1;
+  while (out.size() < static_cast<std::size_t>(options_.max_candidates)) {
+    const std::optional<Candidate> group = groups.next();
+    if (!group || (!out.empty() && group->score < bounds.min_group_score_ratio * out.front().score)) break;
+    if (taken[group->keyframe.index()]) continue;
+    out.push_back(*group);
+    taken[group->keyframe.index()] = 1;
+    for (const map::Covisible& c : neighbours_of(map, group->keyframe, options_)) taken[c.keyframe.index()] = 1;
   }
   return out;
 }
