@@ -8,13 +8,20 @@ import bslam
 import numpy as np
 from PIL import Image  # pip install pillow
 
+SAME_TIME_NS = 5_000_000  # images at most this far apart belong to the same frame
 
-def frames(data: pathlib.Path, cameras: int) -> Iterator[tuple[int, list[np.ndarray | None]]]:
-    """For every time: the images of all cameras, None where there is none."""
-    files = [{int(f.stem): f for f in (data / f"mav0/cam{c}/data").glob("*.png")} for c in range(cameras)]
-    for stamp in sorted(set().union(*files)):
-        found = [camera.get(stamp) for camera in files]
-        yield stamp, [file and np.asarray(Image.open(file).convert("L")) for file in found]
+
+def frames(data: pathlib.Path, cameras: int) -> Iterator[tuple[list[int | None], list[np.ndarray | None]]]:
+    """Stamps and images of all cameras at about the same time, None where there is none."""
+    folders = [data / f"mav0/cam{c}/data" for c in range(cameras)]
+    files = sorted((int(f.stem), c, f) for c, folder in enumerate(folders) for f in folder.iterdir() if f.suffix in {".png", ".jpg"})
+    frame: dict[int, tuple[int, pathlib.Path]] = {}
+    for stamp, camera, file in [*files, (2**63 - 1, 0, data)]:
+        if frame and (camera in frame or stamp > min(frame.values())[0] + SAME_TIME_NS):
+            found = [frame.get(c, (None, None)) for c in range(cameras)]
+            yield [s for s, _ in found], [f and np.asarray(Image.open(f).convert("L")) for _, f in found]
+            frame = {}
+        frame[camera] = stamp, file
 
 
 def main() -> None:
@@ -22,7 +29,7 @@ def main() -> None:
     data, out = map(pathlib.Path, sys.argv[1:3])
     rig = bslam.Rig.load(data)
     system = bslam.System(rig, mode="sequential")  # the same result on every run
-    results = [system.process(stamp, images) for stamp, images in frames(data, len(rig))]
+    results = [system.process(stamps, images) for stamps, images in frames(data, len(rig))]
     system.finish()
     system.save_trajectory(out)
     print(f"{sum(r.tracking for r in results)} of {len(results)} frames have a pose; {system.map()}")

@@ -32,6 +32,12 @@ namespace {
 
 constexpr const char* kOrMirrored = ", or if the images of both cameras are mirrored left to right";
 
+// Returns true if there are so many matches that some convention should fit, but none does.
+bool fits_no_convention(const PairEvidence& pair) {
+  constexpr int kMany = 300;  // matches
+  return !pair.verdict && pair.matches > kMany;
+}
+
 // Returns true if mirrored images explain as many matches as the mistake that was found.
 bool may_be_mirrored(const PairEvidence& pair) {
   return pair.verdict && *pair.verdict != Convention::kMirrored && pair.fits_as_well_mirrored(*pair.verdict);
@@ -61,8 +67,7 @@ std::string describe_pair(const PairEvidence& pair) {
         pair.with(Convention::kAsGiven));
   }
   if (pair.instants == 0) return "not tested: no images taken at the same time, so there is nothing to compare";
-  constexpr int kMany = 300;  // matches; with more than these some convention is expected to fit
-  if (!pair.verdict && pair.matches > kMany)
+  if (fits_no_convention(pair))
     return fmt::format("{} matches, but too few are consistent with any convention", pair.matches);
   if (!pair.verdict)
     return fmt::format("not tested: too few matches for a decision ({}); the calibrated views overlap by {:.0f} %",
@@ -84,6 +89,8 @@ std::string name_of(const PairEvidence& pair) { return fmt::format("{} and {}", 
 
 std::string_view why_untested(const PairEvidence& pair) {
   if (pair.instants == 0) return "no images taken at the same time";
+  if (fits_no_convention(pair))
+    return "matches that fit no convention (wrong intrinsics or time stamps, or things that look alike)";
   return pair.overlap < kSomeOverlap ? "views that hardly overlap" : "too few matches";
 }
 

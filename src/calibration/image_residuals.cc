@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <span>
+
+#include "base/median.h"
 
 namespace bslam::calibration {
 namespace {
@@ -17,13 +20,15 @@ std::size_t cell_of(const Eigen::Vector2f& pixel, const camera::Camera& camera) 
          index(pixel.x(), camera.width, ImageResiduals::kColumns);
 }
 
-// Adds the squared errors to `rms_px` and the errors to the sums of the cells.
-void add_keyframe(const map::BundledMap& map, KeyframeId k, std::vector<ImageResiduals>& residuals) {
+// Calls `add(camera, pixel, error)` for all observations of a keyframe, where `error` is the observed minus the
+// projected position in pixels.
+template <class Add>
+void for_each_error(const map::BundledMap& map, KeyframeId k, const Add& add) {
   const map::BundledKeyframe& keyframe = map.keyframe(k);
   const frame::Bundled& bundled = keyframe.frame->bundled;
   std::vector<geometry::SE3> T_cam_world;
   std::vector<camera::Shutter> shutters;
-  for (std::size_t c = 0; c < residuals.size(); ++c) {
+  for (std::size_t c = 0; c < map.rig().size(); ++c) {
     T_cam_world.push_back(map.cam_from_world(k, CameraIndex(c)));
     shutters.push_back(map.shutter(k, CameraIndex(c)));
   }
@@ -36,16 +41,27 @@ void add_keyframe(const map::BundledMap& map, KeyframeId k, std::vector<ImageRes
       const Eigen::Vector3d point_cam = T_cam_world[ref.camera.index()] * map.landmark(landmark).position;
       const auto projected =
           camera.project(shutters[ref.camera.index()].at_row(point_cam, static_cast<double>(pixel.y())));
-      if (!projected) continue;
-      const Eigen::Vector2d error = pixel.cast<double>() - *projected;
-      ImageResiduals& of_camera = residuals[ref.camera.index()];
-      ++of_camera.observations;
-      of_camera.rms_px += error.squaredNorm();
-      ResidualCell& cell = of_camera.cells[cell_of(pixel, camera)];
-      ++cell.observations;
-      cell.mean_px += error;
+      if (projected) add(ref.camera.index(), pixel, Eigen::Vector2d(pixel.cast<double>() - *projected));
     }
   }
+}
+
+// The squared distance from which on observations of a camera count as outliers, by camera: a number of standard
+// deviations of a normal distribution with the same median.
+std::vector<double> outlier_bounds(const map::BundledMap& map, std::span<const KeyframeId> keyframes) {
+  constexpr double kSigmas = 10.0;
+  const double median_chi2 = 2.0 * std::log(2.0);  // of two degrees of freedom
+  std::vector<std::vector<float>> squared(map.rig().size());
+  for (const KeyframeId k : keyframes) {
+    for_each_error(map, k, [&](std::size_t camera, const Eigen::Vector2f&, const Eigen::Vector2d& error) {
+      squared[camera].push_back(static_cast<float>(error.squaredNorm()));
+    });
+  }
+  std::vector<double> bounds;
+  for (std::vector<float>& of_camera : squared)
+    bounds.push_back(of_camera.empty() ? 0.0
+                                       : kSigmas * kSigmas / median_chi2 * static_cast<double>(median(of_camera)));
+  return bounds;
 }
 
 }  // namespace
@@ -57,8 +73,19 @@ std::vector<ImageResiduals> image_residuals(const map::BundledMap& map, Keyframe
     residuals[c].height = map.rig().camera(c).height;
     residuals[c].cells.resize(ImageResiduals::kRows * ImageResiduals::kColumns);
   }
-  for (const KeyframeId k : map.keyframe_ids()) {
-    if (k >= first) add_keyframe(map, k, residuals);
+  std::vector<KeyframeId> keyframes = map.keyframe_ids();
+  std::erase_if(keyframes, [&](KeyframeId k) { return k < first; });
+  const std::vector<double> bounds = outlier_bounds(map, keyframes);
+  for (const KeyframeId k : keyframes) {
+    for_each_error(map, k, [&](std::size_t c, const Eigen::Vector2f& pixel, const Eigen::Vector2d& error) {
+      if (error.squaredNorm() > bounds[c]) return;
+      ImageResiduals& of_camera = residuals[c];
+      ++of_camera.observations;
+      of_camera.rms_px += error.squaredNorm();
+      ResidualCell& cell = of_camera.cells[cell_of(pixel, map.rig().camera(c))];
+      ++cell.observations;
+      cell.mean_px += error;
+    });
   }
   for (ImageResiduals& r : residuals) {
     if (r.observations > 0) r.rms_px = std::sqrt(r.rms_px / static_cast<double>(r.observations));

@@ -23,7 +23,8 @@ struct ImageResiduals {
   std::vector<ResidualCell> cells;  // kRows rows of kColumns cells
 };
 
-// The residuals of all observations in the map, which are the inliers of the adjustments, for every camera of its rig.
+// The residuals of the observations in the map, for every camera of its rig. Outliers, which are far from the
+// distribution of the others, would hide the pattern, and do not count.
 // Only those of the keyframes from `first` on, such as the first one after a loaded map.
 std::vector<ImageResiduals> image_residuals(const map::BundledMap& map, KeyframeId first = KeyframeId(0));
 

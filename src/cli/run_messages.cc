@@ -27,7 +27,7 @@ void print_reprojection(const session::RunRecord& record) {
     const session::CameraRecord& camera = record.cameras[c];
     const auto share = session::inlier_share(record, c);
     if (camera.residuals.observations == 0 || !share) continue;
-    const double rms_px = camera.residuals.rms_px;  // meaningless if landmarks are almost behind a camera
+    const double rms_px = camera.residuals.rms_px;
     text += fmt::format("{}{} {} px ({:.0f} % inliers)", text.empty() ? "" : ", ", camera.name,
                         rms_px < kLargest_px ? fmt::format("{:.2f}", rms_px) : "over 100", 100 * *share);
   }
@@ -66,6 +66,7 @@ std::string doubt_text(const session::RunRecord& record) {
 // The reason why the calibration could not be tested.
 std::string_view untested_text(const session::RunRecord& record) {
   if (record.cameras.size() < 2) return "calibration: not tested, which takes several cameras: there is a single one";
+  if (!record.complete) return "calibration: not tested, because the run was interrupted";
   if (record.map.scale != "metric") return "calibration: not tested, which takes a map of metric scale";
   return "calibration: not tested, which takes more motion, and landmarks in several keyframes, or "
          "calibration.check is false";

@@ -16,11 +16,17 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::optional<DatasetFormat> known_format(const fs::path& folder) {
+// The format of a folder with files that only one format has.
+std::optional<DatasetFormat> distinct_format(const fs::path& folder) {
   if (looks_like_euroc(folder)) return DatasetFormat::kEuroc;
   if (looks_like_kitti(folder) || looks_like_kitti_raw(folder)) return DatasetFormat::kKitti;
   if (looks_like_folder(folder)) return DatasetFormat::kFolder;
   if (looks_like_bag(folder)) return DatasetFormat::kBag;
+  return std::nullopt;
+}
+
+std::optional<DatasetFormat> known_format(const fs::path& folder) {
+  if (const auto distinct = distinct_format(folder)) return distinct;
   if (has_folders_of_images(folder)) return DatasetFormat::kFolder;
   return std::nullopt;
 }
@@ -52,8 +58,12 @@ std::vector<std::string> recordings_below(const fs::path& folder) {
 
 Result<DatasetFormat> detect_format(const fs::path& folder) {
   constexpr std::size_t kShown = 3;
-  if (const auto known = known_format(folder)) return *known;
+  if (const auto distinct = distinct_format(folder)) return *distinct;
   std::vector<std::string> below = recordings_below(folder);
+  const bool images_only =
+      std::ranges::none_of(below, [&](const std::string& name) { return distinct_format(folder / name).has_value(); });
+  // Folders of images are either recordings or the cameras of one.
+  if (images_only && has_folders_of_images(folder)) return DatasetFormat::kFolder;
   if (!below.empty()) {
     const std::size_t more = below.size() - std::min(below.size(), kShown);
     below.resize(below.size() - more);

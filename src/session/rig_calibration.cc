@@ -59,7 +59,10 @@ Result<Passes> run_passes(const dataset::Dataset& recording, const RigCalibratio
     options.initial_rig = rig;
     auto run = run_session(recording, options);
     if (!run) return run.error();
-    if (request.interrupted.stop_requested()) return Error{recording.name, "", "an interruption", "a complete run"};
+    if (request.interrupted.stop_requested()) {
+      return Error{recording.name, "", "interrupted", "a complete calibration",
+                   recording.name + ": interrupted before the calibration was complete; nothing is written"};
+    }
     if (!run->calibration.done) return nothing_estimated(recording, *run);
     out.converged = out.runs > 0 && agree(out.refinement.information, run->calibration.information);
     ++out.runs;

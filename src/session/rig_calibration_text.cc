@@ -86,6 +86,15 @@ std::string missing_for_extrinsics(std::size_t k) {
       kAxes[k - 3]);
 }
 
+// Returns true if an axis of the second camera of a stereo pair is about parallel to its baseline, whose length no
+// images determine.
+bool along_baseline(const camera::Rig& rig, std::size_t camera, std::size_t axis) {
+  constexpr double kParallel = 0.9;  // cosine
+  if (rig.size() != 2 || camera == 0) return false;
+  const Eigen::Vector3d baseline = rig.in_frame_of_camera_0().cam_from_rig(camera).translation();
+  return std::abs(baseline.normalized()(static_cast<Eigen::Index>(axis))) > kParallel;
+}
+
 std::string missing_text(const RigCalibration& c) {
   std::string out;
   const auto add = [&](const std::string& what, std::size_t camera) {
@@ -97,7 +106,8 @@ std::string missing_text(const RigCalibration& c) {
     for (std::size_t k = 0; k < names.size(); ++k)
       if (!c.joint.cameras[i].intrinsics[k].observed) add(missing_for_intrinsics(names[k]), i);
     for (std::size_t k = 0; k < 6; ++k)
-      if (!c.joint.cameras[i].extrinsics[k].observed) add(missing_for_extrinsics(k), i);
+      if (!c.joint.cameras[i].extrinsics[k].observed && !(k >= 3 && along_baseline(c.start, i, k - 3)))
+        add(missing_for_extrinsics(k), i);
   }
   if (c.scale_std > 0)
     out += fmt::format(

@@ -180,7 +180,7 @@ void warn_of_submaps(const RunRecord& record, Warnings& warnings) {
 }
 
 // Warns about a camera that is still inconsistent with the others at the end of the run, or was so for most of it: its
-// time stamps or extrinsics are probably wrong.
+// time stamps or calibration are probably wrong.
 void warn_of_disagreement(const RunRecord& record, std::size_t camera, const std::string& check_command,
                           Warnings& warnings) {
   constexpr tracking::CameraStatus kDisagrees{tracking::CameraState::kDegraded, tracking::CameraReason::kInconsistent};
@@ -188,7 +188,9 @@ void warn_of_disagreement(const RunRecord& record, std::size_t camera, const std
   if (states.empty() || states.back().status != kDisagrees) {
     if (std::ranges::count(record.calibration.disagreeing, camera) > 0)
       warn(warnings,
-           "{}: inconsistent with the other cameras for most of the run: check its time stamps and extrinsics ({})",
+           "{}: inconsistent with the other cameras for most of the run: its time stamps or its calibration are wrong; "
+           "test "
+           "them ({}), or estimate the calibration with bslam rig calibrate",
            record.cameras[camera].name, check_command);
     return;
   }
@@ -199,7 +201,10 @@ void warn_of_disagreement(const RunRecord& record, std::size_t camera, const std
     inliers += frame.record->final_result().cameras[camera].inliers;
   }
   // The verdict does not apply to a camera whose matches were not used.
-  warn(warnings, "{}: only {} of {} keypoints are inliers: check this camera's time stamps and extrinsics ({}){}",
+  warn(warnings,
+       "{}: only {} of {} keypoints are where the map predicts them: its time stamps or its calibration are wrong, or "
+       "it "
+       "is exchanged with another camera; test them ({}), or estimate the calibration with bslam rig calibrate{}",
        record.cameras[camera].name, inliers, keypoints, check_command,
        record.calibration.verdict() == calibration::Verdict::kConsistent
            ? "; if these are right, something covers it or moves in front of it, or it was moved"

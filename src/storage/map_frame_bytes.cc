@@ -57,8 +57,9 @@ feature::Patches take_patches(SectionReader& in, std::size_t keypoints, std::siz
     present = in.array<std::uint64_t>((keypoints + 63) / 64);
     std::size_t bits = 0;
     for (const std::uint64_t word : present) bits += static_cast<std::size_t>(std::popcount(word));
-    if (in.ok() && keypoints % 64 != 0) bits += std::size_t{present.back() >> (keypoints % 64) != 0};
-    in.require(bits == patches, "marks of patches that do not agree with their number", "one mark per patch");
+    const bool beyond = in.ok() && keypoints % 64 != 0 && present.back() >> (keypoints % 64) != 0;
+    in.require(!beyond && bits == patches, "marks of patches that do not agree with their number",
+               "one mark per patch");
   }
   auto values = in.array<std::uint8_t, Patch>(patches);
   if (!in.ok()) return {};

@@ -171,6 +171,31 @@ TEST(DamagedMaps, OfVersion4AreRejectedOrValidWithBoundedMemory) {
   expect_rejected_or_valid(version_4_bytes(map_to_damage(), small_info()), true);
 }
 
+// A mark beyond the last keypoint, with any number of others.
+TEST(DamagedMaps, WithMarksOfPatchesThatNoKeypointHasAreRejected) {
+  const map::BundledMap source = map_to_damage();
+  frame::BundledFrame frame = *source.keyframe(source.keyframe_ids().front()).frame;
+  feature::Patches& patches = frame.cameras[0].keypoints.patch;
+  std::vector<std::uint8_t> wanted(patches.size(), 0);
+  for (std::size_t k = 0; k < wanted.size(); k += 2) wanted[k] = 1;
+  patches = patches.only(wanted);
+  ASSERT_LT(patches.size(), 60);
+  const std::uint64_t marks = patches.present()[0];
+  map::BundledMap map(source.shared_rig(), source.pyramid());
+  map.add_keyframe(std::make_shared<const frame::BundledFrame>(std::move(frame)), geometry::SE3(), {}, {});
+  const std::string whole = map_to_bytes(map, small_info());
+  ASSERT_TRUE(map_from_bytes(whole, "whole"));
+  const std::size_t at = whole.find(std::string_view(reinterpret_cast<const char*>(&marks), sizeof(marks)));
+  ASSERT_NE(at, std::string::npos);
+  std::uint64_t left = marks;
+  for (int cleared = 0; cleared < 4; ++cleared, left &= left - 1) {
+    std::string bytes = whole;
+    set_number(bytes, at, left | std::uint64_t{1} << 60);
+    repair(bytes);
+    EXPECT_FALSE(map_from_bytes(bytes, "damaged")) << cleared;
+  }
+}
+
 // Counts larger than the file, at all positions near the beginning of sections and at some others.
 TEST(DamagedMaps, WithTooLargeCountsUseBoundedMemory) {
   const std::string whole = map_to_bytes(
