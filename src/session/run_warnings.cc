@@ -18,14 +18,19 @@ void warn(Warnings& warnings, fmt::format_string<Values...> text, Values&&... va
   warnings.push_back(fmt::format(text, std::forward<Values>(values)...));
 }
 
+// Such as "1.27 - 3.40 s"; for a single frame "at 1.27 s".
+std::string interval_text(double from_s, double to_s) {
+  return from_s == to_s ? fmt::format("at {:.2f} s", from_s) : fmt::format("{:.2f} - {:.2f} s", from_s, to_s);
+}
+
 void warn_of_outages(const CameraRecord& camera, Warnings& warnings) {
   constexpr std::size_t kShown = 3;
   std::string shown;
   std::size_t outages = 0;
   for (const CameraInterval& s : camera.states) {
     if (s.status.state == tracking::CameraState::kOk || ++outages > kShown) continue;
-    shown += fmt::format("{}{} {:.1f} - {:.1f} s ({})", shown.empty() ? "" : ", ", tracking::describe(s.status.state),
-                         s.from_s, s.to_s, tracking::describe(s.status.reason));
+    shown += fmt::format("{}{} {} ({})", shown.empty() ? "" : ", ", tracking::describe(s.status.state),
+                         interval_text(s.from_s, s.to_s), tracking::describe(s.status.reason));
   }
   if (outages == 0) return;
   if (outages > kShown) shown += fmt::format(" and {} more intervals", outages - kShown);
@@ -130,7 +135,7 @@ void warn_of_losses(const RunRecord& record, const std::string& check_command, W
   if (intervals.empty()) return;
   std::string shown;
   for (std::size_t i = 0; i < std::min(kShown, intervals.size()); ++i) {
-    shown += fmt::format("{}{:.2f} - {:.2f} s ({})", i == 0 ? "" : ", ", intervals[i].from_s, intervals[i].to_s,
+    shown += fmt::format("{}{} ({})", i == 0 ? "" : ", ", interval_text(intervals[i].from_s, intervals[i].to_s),
                          intervals[i].reason);
   }
   if (intervals.size() > kShown)
