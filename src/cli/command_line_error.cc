@@ -105,7 +105,7 @@ std::optional<Error> value_error(const CLI::App& verb, const std::string& text) 
   const auto parts = parted(text, ": ");
   if (!parts) return std::nullopt;
   if (text.find(" required ") != std::string::npos && text.ends_with(" missing"))
-    return option_error(parts->before, "no value behind it", kind_of_value(verb, parts->before));
+    return option_error(parts->before, "no value after it", kind_of_value(verb, parts->before));
   if (const auto set = parted(parts->behind, " not in {"); set && set->behind.ends_with('}')) {
     std::string names = set->behind.substr(0, set->behind.size() - 1);
     for (std::size_t at = 0; (at = names.find(',', at)) != std::string::npos; at += 2) names.replace(at, 1, ", ");

@@ -24,8 +24,9 @@ CarvingOptions carving_options(const Exporter& exporter) {
 std::string axes_text(const Exporter& exporter) {
   const geometry::Quaterniond& q = exporter.selection.T_upright_world.rotation();
   return fmt::format(
-      "axes: x forward, y left, z up; rotation from the world of the trajectory, qx qy qz qw: {} {} {} {}", q.x(),
-      q.y(), q.z(), q.w());
+      "axes: x forward, y left, z up; this rotation turns positions of the trajectory into these axes, qx qy qz qw: "
+      "{:.9f} {:.9f} {:.9f} {:.9f}",
+      q.x(), q.y(), q.z(), q.w());
 }
 
 // Poses of camera 0 in the frame of the map server, as a file of the format TUM.
