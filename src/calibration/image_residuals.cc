@@ -51,9 +51,10 @@ void for_each_error(const map::BundledMap& map, KeyframeId k, const Add& add) {
 std::vector<double> outlier_bounds(const map::BundledMap& map, std::span<const KeyframeId> keyframes) {
   constexpr double kSigmas = 10.0;
   const double median_chi2 = 2.0 * std::log(2.0);  // of two degrees of freedom
+  constexpr std::size_t kSampled = 16;             // keyframes that are enough for the median
   std::vector<std::vector<float>> squared(map.rig().size());
-  for (const KeyframeId k : keyframes) {
-    for_each_error(map, k, [&](std::size_t camera, const Eigen::Vector2f&, const Eigen::Vector2d& error) {
+  for (std::size_t i = 0; i < keyframes.size(); i += keyframes.size() / kSampled + 1) {
+    for_each_error(map, keyframes[i], [&](std::size_t camera, const Eigen::Vector2f&, const Eigen::Vector2d& error) {
       squared[camera].push_back(static_cast<float>(error.squaredNorm()));
     });
   }
