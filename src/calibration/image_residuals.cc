@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
+#include <limits>
 #include <span>
+#include <utility>
 
 #include "base/median.h"
 
@@ -47,7 +48,7 @@ void for_each_error(const map::BundledMap& map, KeyframeId k, const Add& add) {
 }
 
 // The squared distance from which on observations of a camera count as outliers, by camera: a number of standard
-// deviations of a normal distribution with the same median.
+// deviations of a normal distribution with the same median. Infinite for a camera without observations in the sample.
 std::vector<double> outlier_bounds(const map::BundledMap& map, std::span<const KeyframeId> keyframes) {
   constexpr double kSigmas = 10.0;
   const double median_chi2 = 2.0 * std::log(2.0);  // of two degrees of freedom
@@ -59,9 +60,10 @@ std::vector<double> outlier_bounds(const map::BundledMap& map, std::span<const K
     });
   }
   std::vector<double> bounds;
-  for (std::vector<float>& of_camera : squared)
-    bounds.push_back(of_camera.empty() ? 0.0
-                                       : kSigmas * kSigmas / median_chi2 * static_cast<double>(median(of_camera)));
+  for (std::vector<float>& of_camera : squared) {
+    bounds.push_back(of_camera.empty() ? std::numeric_limits<double>::infinity()
+                                       : kSigmas * kSigmas / median_chi2 * median(std::move(of_camera)));
+  }
   return bounds;
 }
 

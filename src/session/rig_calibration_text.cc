@@ -86,8 +86,8 @@ std::string missing_for_extrinsics(std::size_t k) {
       kAxes[k - 3]);
 }
 
-// Returns true if an axis of the second camera of a stereo pair is about parallel to its baseline, whose length no
-// images determine.
+// Returns true if an axis of the second camera of a stereo pair is about parallel to its baseline. Motion does not help
+// there, since the length of the baseline is the scale of the rig.
 bool along_baseline(const camera::Rig& rig, std::size_t camera, std::size_t axis) {
   constexpr double kParallel = 0.9;  // cosine
   if (rig.size() != 2 || camera == 0) return false;
@@ -105,9 +105,10 @@ std::string missing_text(const RigCalibration& c) {
     const std::vector<std::string> names = camera::parameter_names(c.start.camera(i).model);
     for (std::size_t k = 0; k < names.size(); ++k)
       if (!c.joint.cameras[i].intrinsics[k].observed) add(missing_for_intrinsics(names[k]), i);
-    for (std::size_t k = 0; k < 6; ++k)
-      if (!c.joint.cameras[i].extrinsics[k].observed && !(k >= 3 && along_baseline(c.start, i, k - 3)))
-        add(missing_for_extrinsics(k), i);
+    for (std::size_t k = 0; k < 6; ++k) {
+      const bool is_scale = c.scale_std > 0 && k >= 3 && along_baseline(c.start, i, k - 3);  // reported below
+      if (!c.joint.cameras[i].extrinsics[k].observed && !is_scale) add(missing_for_extrinsics(k), i);
+    }
   }
   if (c.scale_std > 0)
     out += fmt::format(

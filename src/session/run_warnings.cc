@@ -194,8 +194,7 @@ void warn_of_disagreement(const RunRecord& record, std::size_t camera, const std
     if (std::ranges::count(record.calibration.disagreeing, camera) > 0)
       warn(warnings,
            "{}: inconsistent with the other cameras for most of the run: its time stamps or its calibration are wrong; "
-           "test "
-           "them ({}), or estimate the calibration with bslam rig calibrate",
+           "test them ({}), or estimate the calibration with bslam rig calibrate",
            record.cameras[camera].name, check_command);
     return;
   }
@@ -208,8 +207,7 @@ void warn_of_disagreement(const RunRecord& record, std::size_t camera, const std
   // The verdict does not apply to a camera whose matches were not used.
   warn(warnings,
        "{}: only {} of {} keypoints are where the map predicts them: its time stamps or its calibration are wrong, or "
-       "it "
-       "is exchanged with another camera; test them ({}), or estimate the calibration with bslam rig calibrate{}",
+       "it is exchanged with another camera; test them ({}), or estimate the calibration with bslam rig calibrate{}",
        record.cameras[camera].name, inliers, keypoints, check_command,
        record.calibration.verdict() == calibration::Verdict::kConsistent
            ? "; if these are right, something covers it or moves in front of it, or it was moved"

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+
 #include "mapping/simulated_map.h"
 
 namespace bslam::calibration {
@@ -40,6 +42,40 @@ TEST(ImageResiduals, OfATrueMapAreTheNoise) {
   EXPECT_GT(later[0].observations, 0u);
   EXPECT_LT(later[0].observations, residuals[0].observations);
   EXPECT_EQ(image_residuals(simulated.map, KeyframeId(12))[0].observations, 0u);
+}
+
+TEST(ImageResiduals, AreNotSpoiltByOutliers) {
+  map::SimulatedMap simulated = map_of(synthetic::ring_rig(2));
+  const auto before = image_residuals(simulated.map);
+  map::MapDraft draft = simulated.draft();
+  map::SetPoses moved;
+  for (const LandmarkId l : draft.map().landmark_ids()) {
+    if (l.index() % 100 == 0) moved.landmarks.emplace_back(l, Eigen::Vector3d(2.0 * draft.map().landmark(l).position));
+  }
+  draft.set_poses(std::move(moved));
+  const auto after = image_residuals(draft.map());
+  for (std::size_t c = 0; c < after.size(); ++c) {
+    EXPECT_LT(after[c].observations, before[c].observations);
+    EXPECT_LT(after[c].rms_px, 1.2 * before[c].rms_px);
+  }
+}
+
+// Keyframe 1 is the only one with an image of camera 1.
+TEST(ImageResiduals, ExistForACameraThatHasImagesInFewKeyframes) {
+  constexpr std::array<int, 1> kSecond = {1};
+  map::SimulatedMap simulated(synthetic::FeatureSimulator(synthetic::ring_rig(2), synthetic::make_orbit({}), {}));
+  for (int i = 0; i < 40; ++i) {
+    const auto missing = i == 1 ? std::span<const int>() : std::span<const int>(kSecond);
+    const synthetic::SimulatedFrame seen = simulated.sim.frame(FrameId(i), 0.1 * i, missing);
+    const KeyframeId k = simulated.map.add_keyframe(std::make_shared<const frame::BundledFrame>(seen.frame),
+                                                    seen.T_world_rig.inverse(), {}, simulated.map.newest_keyframe());
+    for (std::size_t f = 0; f < seen.frame.bundled.size(); ++f) {
+      const map::Observation observation{k, FeatureId(f)};
+      if (const int truth = map::shown_by(seen, FeatureId(f)); truth >= 0)
+        simulated.map.add_landmark(simulated.truth_of(truth), std::span(&observation, 1));
+    }
+  }
+  EXPECT_GT(image_residuals(simulated.map)[1].observations, 50u);
 }
 
 // A focal length that is 2 % too short projects points closer to the centre, so the residuals point outward.
