@@ -16,8 +16,6 @@ namespace {
 
 using geometry::SE3;
 
-constexpr int kMaxHamming = 60;       // bits; largest descriptor distance of a match
-constexpr double kRatio = 0.85;       // largest ratio of best to second best descriptor distance
 constexpr double kTolerancePx = 2.0;  // tolerance for the errors of calibration and feature localisation together
 constexpr int kMinAgreeing = 25;
 constexpr double kMinRatio = 0.4;     // minimum fraction of consistent matches; random matches reach a few per cent
@@ -31,8 +29,8 @@ using estimators::PixelPair;
 // Mutual best matches. No geometric constraint is used, since the geometry itself is tested.
 std::vector<PixelPair> match(const feature::Detections& a, const feature::Detections& b) {
   std::vector<PixelPair> pairs;
-  for (const feature::DescriptorMatch& m : feature::mutual_matches(a.descriptor, b.descriptor, kMaxHamming, kRatio,
-                                                                   [](std::size_t, std::size_t) { return true; })) {
+  for (const feature::DescriptorMatch& m :
+       feature::mutual_matches(a.descriptor, b.descriptor, [](std::size_t, std::size_t) { return true; })) {
     pairs.push_back({a.pixel[m.a.index()].cast<double>(), b.pixel[m.b.index()].cast<double>()});
   }
   return pairs;

@@ -88,6 +88,11 @@ class EurocRecording : public Recording {
   std::vector<fs::path> folders_;
 };
 
+bool partly_written(const fs::path& folder) {
+  std::error_code error;
+  return fs::exists(folder / rig_formats::kPartial, error) && !fs::exists(folder / rig_formats::kComplete, error);
+}
+
 }  // namespace
 
 bool looks_like_euroc(const fs::path& folder) {
@@ -97,6 +102,10 @@ bool looks_like_euroc(const fs::path& folder) {
 
 RecordingResult open_euroc(const fs::path& folder) {
   const fs::path root = rig_formats::euroc_root(folder);
+  if (partly_written(root.parent_path())) {
+    return Error{root.parent_path().string(), "", "a recording of which bslam simulate wrote only a part",
+                 "a complete one: the command that began it continues"};
+  }
   auto folders = rig_formats::camera_folders(root, "");
   if (folders.empty()) return Error{root.string(), "", "no camera", "cam0, cam1, ... with data.csv and sensor.yaml"};
   return std::unique_ptr<Recording>(std::make_unique<EurocRecording>(root, std::move(folders)));

@@ -62,4 +62,13 @@ std::vector<DescriptorMatch> mutual_matches(std::span<const Descriptor> a, std::
   return matches;
 }
 
+// The same with bounds for matches whose positions are not predicted.
+template <class Allowed>
+std::vector<DescriptorMatch> mutual_matches(std::span<const Descriptor> a, std::span<const Descriptor> b,
+                                            const Allowed& allowed) {
+  constexpr int kMaxDistance = 60;  // bits
+  constexpr double kRatio = 0.85;
+  return mutual_matches(a, b, kMaxDistance, kRatio, allowed);
+}
+
 }  // namespace bslam::feature

@@ -15,6 +15,10 @@ namespace bslam::rig_formats {
 // are ignored, since the format has many. `name` becomes the name of the camera.
 Result<camera::RigCamera> read_euroc_sensor(const std::filesystem::path& file, const std::string& name);
 
+// Files in the folder of a recording that is being written image by image, and of one that is complete.
+inline constexpr const char* kPartial = ".partial";
+inline constexpr const char* kComplete = ".complete";
+
 // Returns the folders cam0, cam1, ... in `folder` that contain `entry`, ordered by number.
 std::vector<std::filesystem::path> camera_folders(const std::filesystem::path& folder, const std::string& entry);
 

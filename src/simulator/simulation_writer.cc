@@ -30,8 +30,7 @@ namespace fs = std::filesystem;
 constexpr int kWorldVersion = 1;  // version of the images; to be incremented whenever the images of a request change
 constexpr int kListsVersion = 2;  // version of the other files; to be incremented whenever they change
 constexpr double kGroundTruthRate = 200.0;  // Hz
-constexpr const char* kPartial = ".partial";
-constexpr const char* kComplete = ".complete";
+using rig_formats::kComplete, rig_formats::kPartial;
 
 Status make_folder(const fs::path& folder) {
   std::error_code code;

@@ -14,8 +14,6 @@ namespace {
 
 using geometry::SE3;
 
-constexpr int kMaxHamming = 60;         // bits
-constexpr double kRatio = 0.85;         // maximum ratio of the nearest to the second nearest descriptor distance
 constexpr double kMinCosine = 0.95;     // minimum cosine of the angle between the bearings of a match: 18 degrees
 constexpr double kDeviations = 1.5;     // maximum difference of two positions in standard deviations
 constexpr double kNearest = 0.1;        // minimum distance of a point as a fraction of the median distance
@@ -63,7 +61,7 @@ SceneMatches::SceneMatches(const TrackInput& input, const frame::BundledFrame& f
     T_camera_rig_.push_back(rig.cam_from_rig(c));
     if (excluded) continue;
     for (const feature::DescriptorMatch& m : feature::mutual_matches(
-             a.descriptor, b.descriptor, kMaxHamming, kRatio,
+             a.descriptor, b.descriptor,
              [&](std::size_t i, std::size_t j) { return a.bearing[i].dot(b.bearing[j]) > kMinCosine; })) {
       const std::size_t i = m.a.index(), j = m.b.index();
       const double sigma = std::hypot(input.features.sigma(a.level[i]), input.features.sigma(b.level[j]));

@@ -12,8 +12,6 @@
 namespace bslam::tracking {
 namespace {
 
-constexpr int kMaxHamming = 60;  // bits
-constexpr double kRatio = 0.85;  // maximum ratio of the nearest to the second nearest descriptor distance
 constexpr std::size_t kMinMatches = 60;
 constexpr double kMinAgreeing = 0.6;  // minimum fraction of the matches that agree with the correction
 constexpr int kMinWithDepth = 25;     // minimum number of these that are in front of both cameras
@@ -27,9 +25,8 @@ using estimators::PixelPair;
 
 std::vector<PixelPair> matches_of(const frame::CameraFrame& a, const frame::CameraFrame& b) {
   std::vector<PixelPair> out;
-  for (const feature::DescriptorMatch& m :
-       feature::mutual_matches(a.keypoints.descriptor, b.keypoints.descriptor, kMaxHamming, kRatio,
-                               [](std::size_t, std::size_t) { return true; })) {
+  for (const feature::DescriptorMatch& m : feature::mutual_matches(a.keypoints.descriptor, b.keypoints.descriptor,
+                                                                   [](std::size_t, std::size_t) { return true; })) {
     out.push_back({a.keypoints.pixel[m.a.index()].cast<double>(), b.keypoints.pixel[m.b.index()].cast<double>()});
   }
   return out;

@@ -188,7 +188,7 @@ TrackOutcome Tracker::process(FrontEndState state, BundledFrame frame, std::span
   apply_scale_change(*map, outcome.next.track);
   pause_direct_tracking(direct.failure, outcome.next);
   outcome.next.keyframe_failed = false;
-  const Input input{frame, pyramids, map, std::move(direct)};
+  Input input{std::move(frame), pyramids, map, std::move(direct)};
   if (map->num_keyframes() == 0) {
     start(input, outcome);
   } else {
@@ -224,7 +224,7 @@ TrackOutput Tracker::follow(const Input& input, const FrontEndState& state,
   return tracking::track(track_input, input.frame, level_of(state).tracking, pool_);
 }
 
-void Tracker::track(const Input& input, TrackOutcome& outcome) {
+void Tracker::track(Input& input, TrackOutcome& outcome) {
   const Stopwatch watch;
   FrontEndState& state = outcome.next;
   FrameRecord& record = outcome.record;
@@ -279,7 +279,7 @@ bool Tracker::gives_up(const FrontEndState& state, TimeNs time_ns) const {
 
 // The next frames search for the rig where its last motion would have taken it, or near its last pose if that is too
 // long ago. After too many lost frames a new submap is started.
-void Tracker::handle_lost(const Input& input, const TrackerState& before, TrackOutcome& outcome) {
+void Tracker::handle_lost(Input& input, const TrackerState& before, TrackOutcome& outcome) {
   FrontEndState& state = outcome.next;
   const TrackResult result = outcome.record.result;
   state.track = before;
@@ -295,7 +295,7 @@ void Tracker::handle_lost(const Input& input, const TrackerState& before, TrackO
 }
 
 // Returns true if a place was found. The state is then set to its pose, which tracking has to confirm.
-bool Tracker::relocalise(const Input& input, TrackOutcome& outcome) {
+bool Tracker::relocalise(Input& input, TrackOutcome& outcome) {
   if (!relocaliser_) return false;
   const Stopwatch watch;
   relocaliser_->describe(input.frame);

@@ -172,32 +172,32 @@ class Tracker {
   std::vector<int> budgets(const FrontEndState& state, std::span<const std::uint8_t> skipped,
                            std::span<const std::uint8_t> failing) const;
   struct Input {
-    frame::BundledFrame& frame;
+    frame::BundledFrame frame;  // described and refined while it is processed
     std::span<const image::Pyramid> pyramids;
     const map::MapSnapshot& map;
     DirectAttempt direct = {};
   };
   std::vector<matching::AlignmentOptions> alignment(const FrontEndState& state) const;
 
-  void track(const Input& input, TrackOutcome& outcome);
+  void track(Input& input, TrackOutcome& outcome);
   TrackInput input_of(const map::BundledMap& map, std::span<const image::Pyramid> pyramids,
                       std::span<const matching::AlignmentOptions> alignment, const FrontEndState& state) const;
   TrackOutput follow(const Input& input, const FrontEndState& state,
                      const std::optional<EstimatedPose>& estimate) const;
-  bool relocalise(const Input& input, TrackOutcome& outcome);
+  bool relocalise(Input& input, TrackOutcome& outcome);
   bool keep_direct_pose(const Input& input, TrackOutcome& outcome) const;
   bool gives_up(const FrontEndState& state, TimeNs time_ns) const;
-  void handle_lost(const Input& input, const TrackerState& before, TrackOutcome& outcome);
+  void handle_lost(Input& input, const TrackerState& before, TrackOutcome& outcome);
 
   // tracker_keyframe.cc
-  void propose_keyframe(const Input& input, const TrackOutput& output, TrackOutcome& outcome) const;
+  void propose_keyframe(Input& input, const TrackOutput& output, TrackOutcome& outcome) const;
   void want_keyframe(const map::BundledMap& map, TrackOutcome& outcome) const;
   void complete_keyframe(const map::CommitReport& report, TrackOutcome& outcome) const;
 
   // tracker_start.cc
-  void start(const Input& input, TrackOutcome& outcome) const;
+  void start(Input& input, TrackOutcome& outcome) const;
   std::optional<StartedMap> initialise(const Input& input, const FrontEndState& state, map::MapDraft& draft) const;
-  void keep_reference_frame(const Input& input, FrontEndState& state) const;
+  void keep_reference_frame(Input& input, FrontEndState& state) const;
   bool correct_rig(const Input& input, TrackOutcome& outcome) const;
   void complete_start(const map::CommitReport& report, TrackOutcome& outcome) const;
 

@@ -40,7 +40,7 @@ KeyframeId keyframe_of(const map::BundledMap& map, const PendingKeyframe& pendin
 
 }  // namespace
 
-void Tracker::propose_keyframe(const Input& input, const TrackOutput& output, TrackOutcome& outcome) const {
+void Tracker::propose_keyframe(Input& input, const TrackOutput& output, TrackOutcome& outcome) const {
   const Stopwatch watch;
   map::MapDraft draft(input.map);
   draft.add_visibility_counts(folded(std::move(outcome.next.track.visibility_counts)));
@@ -79,12 +79,12 @@ std::optional<TrackOutcome> Tracker::create_keyframe(KeyframeRequest request, st
   outcome.next = std::move(request.before);
   FrontEndState& state = outcome.next;
   apply_scale_change(*map, state.track);
-  const Input input{request.frame, pyramids, map};
+  Input input{std::move(request.frame), pyramids, map};
   TrackOutput output = follow(input, state, EstimatedPose{*T_rig_world, true});
   if (output.result.status != TrackStatus::kTracking) return std::nullopt;
-  request.frame = output.frame;  // refined by tracking
+  input.frame = output.frame;  // refined by tracking
   outcome.record.result = output.result;
-  state.budget_fractions = budget_fractions(state.budget_fractions, *map, request.frame, output);
+  state.budget_fractions = budget_fractions(state.budget_fractions, *map, input.frame, output);
   state.track = std::move(output.state);
   propose_keyframe(input, output, outcome);
   return outcome;

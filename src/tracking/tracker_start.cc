@@ -42,7 +42,7 @@ bool from_other_cameras(const BundledFrame& a, const BundledFrame& b) {
 
 }  // namespace
 
-void Tracker::start(const Input& input, TrackOutcome& outcome) const {
+void Tracker::start(Input& input, TrackOutcome& outcome) const {
   const Stopwatch watch;
   outcome.record.result = not_started(input.frame);
   if (correct_rig(input, outcome)) {
@@ -99,7 +99,7 @@ bool Tracker::correct_rig(const Input& input, TrackOutcome& outcome) const {
 
 // Stores the frame. The frame becomes the new reference frame if the present one is too old or has too few matches with
 // it. A frame of other cameras cannot be matched with the reference frame and does not replace it.
-void Tracker::keep_reference_frame(const Input& input, FrontEndState& state) const {
+void Tracker::keep_reference_frame(Input& input, FrontEndState& state) const {
   const InitialisationOptions& options = options_.tracking.initialisation;
   if (state.start_reference && input.frame.num_keypoints() < static_cast<std::size_t>(options.min_monocular))
     return;  // too few keypoints to compare

@@ -228,6 +228,13 @@ TEST_F(SmallEuroc, NoCameraInIt) {
   expect_error(data() / "mav0", "no camera");
 }
 
+TEST_F(SmallEuroc, OnlyAPartIsWritten) {
+  support::write_text(data() / ".partial", "");
+  expect_error(data(), "only a part");
+  support::write_text(data() / ".complete", "");
+  EXPECT_TRUE(open());
+}
+
 TEST_F(SmallEuroc, SensorYamlIsMissing) {
   fs::remove(camera(0) / "sensor.yaml");
   expect_error(camera(0) / "sensor.yaml", "No such file");
