@@ -208,18 +208,25 @@ ErrorCode Connections::open(const tcp::endpoint& endpoint) {
 void Connections::accept() {
   acceptor_.async_accept([this](ErrorCode error, tcp::socket socket) {
     if (error == asio::error::operation_aborted || !acceptor_.is_open()) return;
-    if (!error && open_ < limits_.connections) {
-      ErrorCode ignored;
-      socket.set_option(asio::socket_base::send_buffer_size(kSendBuffer), ignored);
-      socket.set_option(tcp::no_delay(true), ignored);
-      ++open_;
-      Slot slot(this, [](Connections* all) { --all->open_; });
-      std::make_shared<Connection>(*this, std::move(socket), std::move(slot))->read();
-    }
-    // A lack of file descriptors or memory lasts; trying again at once would keep the thread busy.
+    // A lack of file descriptors lasts; trying again at once would keep the thread busy.
     if (error) return accept_later();
-    accept();
+    accept();  // before anything that needs memory: this operation takes over that of the one that has ended
+    begin(std::move(socket));
   });
+}
+
+// Reads the request of a new connection, or closes it if there are too many or memory is lacking.
+void Connections::begin(tcp::socket socket) {
+  if (open_ >= limits_.connections) return;
+  try {
+    ErrorCode ignored;
+    socket.set_option(asio::socket_base::send_buffer_size(kSendBuffer), ignored);
+    socket.set_option(tcp::no_delay(true), ignored);
+    ++open_;
+    Slot slot(this, [](Connections* all) { --all->open_; });  // calls this also if it throws
+    std::make_shared<Connection>(*this, std::move(socket), std::move(slot))->read();
+  } catch (const std::exception&) {  // the destructors have closed the connection
+  }
 }
 
 void Connections::accept_later() {

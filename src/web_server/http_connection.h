@@ -44,6 +44,7 @@ class Connections {
   friend class Connection;
   boost::system::error_code open(const boost::asio::ip::tcp::endpoint& endpoint);
   void accept();
+  void begin(Socket socket);
   void accept_later();
   void answer_begins() { ++answering_; }
   void answer_ends();
