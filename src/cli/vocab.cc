@@ -107,11 +107,12 @@ int run_train(const VocabTrainArguments& a) {
   if (const Status s = check_output(a); !s) return report_error(s.error());
   const auto files = dataset::find_images(a.images);
   if (!files) return report_error(files.error());
-  if (files->empty()) return report_error({a.images.front(), "", "no images", "PNG, JPEG, PGM or WebP images"});
+  if (files->empty())
+    return report_error({a.images.front(), "", "no images", "PNG, JPEG, WebP, PNM, BMP or TIFF images"});
   ThreadPool pool(a.threads > 0 ? a.threads : processor_cores());
   const TrainingSet set = extract_all(*files, a, pool);
   if (set.images.empty())
-    return report_error({a.images.front(), "", "no readable image", "PNG, JPEG, PGM or WebP images"});
+    return report_error({a.images.front(), "", "no readable image", "PNG, JPEG, WebP, PNM, BMP or TIFF images"});
   Random random(a.seed, "vocabulary");
   ProgressBar bar(a.progress == "auto", "descriptors");
   const auto vocabulary = place::train_vocabulary(set.images, a.training, random, pool,
@@ -156,7 +157,7 @@ void add_train(CLI::App& vocab, int& exit_status) {
   VocabTrainArguments& a = *arguments;
   CLI::App* verb = vocab.add_subcommand("train", "train a vocabulary on images");
   verb->add_option("IMAGES", a.images,
-                   "PNG, JPEG, PGM or WebP images, or folders that are searched for them recursively")
+                   "PNG, JPEG, WebP, PNM, BMP or TIFF images, or folders that are searched for them recursively")
       ->required();
   verb->add_option("--out", a.out, "file to write")->required();
   verb->add_option("--branching", a.training.branching, "number of children of a tree node")

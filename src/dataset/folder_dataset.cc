@@ -180,7 +180,7 @@ class FolderRecording : public Recording {
       std::error_code error;
       for (fs::directory_iterator it(folders_.cameras[c].images, error), end; !error && it != end;
            it.increment(error)) {
-        if (may_be_image(it->path()) && count++ == 0) first = it->path().string();
+        if (is_undecodable_image(it->path()) && count++ == 0) first = it->path().string();
       }
       if (!cameras_[c] || cameras_[c]->left_out_count == 0) continue;
       if (count == 0) first = cameras_[c]->left_out;

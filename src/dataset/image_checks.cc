@@ -36,7 +36,7 @@ std::vector<const image_files::ImageFile*> samples_of(const Images& images) {
   return samples;
 }
 
-// Between the images of most of a recording: longer ones are gaps, and shorter ones are those of two mixed series.
+// Returns the 80 % quantile of the intervals: longer ones are gaps, and shorter ones occur where two series are mixed.
 TimeNs usual_interval(std::vector<TimeNs> intervals) {
   const auto at = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() * 4 / 5);
   std::ranges::nth_element(intervals, at);
@@ -89,7 +89,7 @@ bool have_same_images(FirstImages& a, FirstImages& b) {
   return equal >= kEqual;
 }
 
-// Names of the files in the folder of an image.
+// Tells whether files exist; lists each folder once.
 class FolderContents {
  public:
   bool has(const std::filesystem::path& file) {
@@ -176,7 +176,8 @@ Status check_different_images(const std::vector<Images>& images) {
 }
 
 std::optional<std::string> interleaved_warning(const Images& images) {
-  constexpr std::size_t kLeast = 10;  // images in a row that alternate, and usual intervals elsewhere
+  // Minimum number of successive alternating intervals, and of usual intervals elsewhere.
+  constexpr std::size_t kLeast = 10;
   if (images.size() < 2 * kLeast) return std::nullopt;
   std::vector<TimeNs> intervals;
   for (std::size_t k = 1; k < images.size(); ++k) intervals.push_back(images[k].time_ns - images[k - 1].time_ns);

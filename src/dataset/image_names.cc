@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <optional>
@@ -28,11 +29,8 @@ std::string kind_of(const fs::path& file) {
   return extension.substr(extension.starts_with('.') ? 1 : 0);
 }
 
-bool is_one_of(const std::string& kind, std::initializer_list<std::string_view> kinds) {
-  return std::ranges::find(kinds, kind) != kinds.end();
-}
-
-// A name without its extension, as numbers and the texts around them: one more than numbers.
+// A name without its extension, split into its numbers and the texts before, between and after them (one text more than
+// numbers).
 struct SplitName {
   fs::path file;
   std::vector<std::string> numbers, texts = {""};
@@ -58,15 +56,16 @@ SplitName split_name(const fs::path& file) {
 // Names of one kind have the same texts, and the same extension. PNG and JPEG may be mixed.
 using Kind = std::pair<std::vector<std::string>, std::string>;
 using Group = std::vector<SplitName>;
+using Kinds = std::map<Kind, Group>;
 
-const Kind kDigitsOnly = {{"", ""}, ""};
+bool of_digits_only(const Kind& kind) { return kind.first == std::vector<std::string>{"", ""}; }
 
-std::map<Kind, Group> kinds_of(const std::vector<fs::path>& files) {
-  std::map<Kind, Group> kinds;
+Kinds kinds_of(const std::vector<fs::path>& files) {
+  Kinds kinds;
   for (const fs::path& file : files) {
     SplitName name = split_name(file);
     std::string extension = kind_of(file);
-    if (is_one_of(extension, {"png", "jpg", "jpeg"})) extension.clear();
+    if (image_files::is_png_or_jpeg_name(file)) extension.clear();
     if (extension == "tiff") extension = "tif";
     Kind kind{name.texts, extension};
     kinds[std::move(kind)].push_back(std::move(name));
@@ -74,22 +73,25 @@ std::map<Kind, Group> kinds_of(const std::vector<fs::path>& files) {
   return kinds;
 }
 
-// Returns the only kind of names that several images have.
-Result<const Group*> chosen_kind(const fs::path& folder, const std::map<Kind, Group>& kinds) {
-  std::vector<const Group*> several, single;
-  for (const auto& [kind, group] : kinds) {
-    if (kind.first.size() > 1) (group.size() > 1 ? several : single).push_back(&group);
+// Returns the only kind of names that several images have. Names of digits only take precedence, and among these PNG
+// and JPEG, which come first in the order of kinds.
+Result<const Group*> chosen_kind(const fs::path& folder, const Kinds& kinds) {
+  std::vector<const Kinds::value_type*> several, single;
+  for (const auto& entry : kinds) {
+    if (entry.first.first.size() > 1) (entry.second.size() > 1 ? several : single).push_back(&entry);
   }
-  const auto digits = kinds.find(kDigitsOnly);
-  if (digits != kinds.end() && (digits->second.size() > 1 || several.empty())) return &digits->second;
-  const std::vector<const Group*>& found = several.empty() ? single : several;
-  if (found.size() == 1) return found[0];
+  auto& found = several.empty() ? single : several;
+  const auto others = [](const auto* entry) { return !of_digits_only(entry->first); };
+  const bool digits = !std::ranges::all_of(found, others);
+  if (digits) std::erase_if(found, others);
+  if (found.size() == 1 || (digits && found[0]->first.second.empty())) return &found[0]->second;
   if (found.empty())
     return Error{folder.string(), "", "no images with a number in their names", "images named by their time stamps"};
-  return Error{folder.string(), "",
-               fmt::format("images with names of several kinds, such as {} and {}",
-                           found[0]->front().file.filename().string(), found[1]->front().file.filename().string()),
-               "one kind of names in a folder, and a folder for each camera"};
+  return Error{
+      folder.string(), "",
+      fmt::format("images with names of several kinds, such as {} and {}",
+                  found[0]->second.front().file.filename().string(), found[1]->second.front().file.filename().string()),
+      "one kind of names in a folder, and a folder for each camera"};
 }
 
 // Returns which of the numbers differ between the names.
@@ -100,7 +102,7 @@ std::vector<std::size_t> varying_numbers(const Group& group) {
       varying.push_back(k);
   }
   if (!varying.empty()) return varying;
-  // Numbers in the name of a single image.
+  // No number varies, as with a single image: take the longest.
   const auto longest = std::ranges::max_element(group.front().numbers, {}, &std::string::size);
   return {static_cast<std::size_t>(longest - group.front().numbers.begin())};
 }
@@ -116,8 +118,8 @@ std::optional<std::size_t> decimal_seconds(const Group& group, const std::vector
   return std::nullopt;
 }
 
-// Some programs write decimals without the zeros behind them, others a whole number of nanoseconds, microseconds or
-// milliseconds without the zeros before it.
+// Some programs drop trailing zeros of the fraction; others print an integer number of nanoseconds, microseconds or
+// milliseconds after the point without leading zeros.
 enum class Fraction { kDecimal, kUnpadded };
 
 std::optional<TimeNs> seconds_of(const SplitName& name, std::size_t seconds, Fraction fraction,
@@ -141,8 +143,9 @@ double irregularity(const Group& group, std::size_t seconds, Fraction fraction, 
   return sum / std::max(median, 1.0);
 }
 
-// Returns what the digits behind the point are, if they are not as many in all names. A shorter number that ends in 0
-// is no decimal without its zeros, and one that begins with 0 has been padded.
+// Returns at which end zeros were dropped, if not all names have the same number of digits after the point. A shorter
+// fraction of several digits that ends in 0 rules out dropped trailing zeros; a fraction that begins with 0 rules out
+// dropped leading zeros.
 Result<Fraction> fraction_of(const fs::path& folder, const Group& group, std::size_t seconds) {
   constexpr double kClearly = 3;
   const auto digits = [&](const SplitName& name) -> const std::string& { return name.numbers[seconds + 1]; };
@@ -168,9 +171,9 @@ Result<Fraction> fraction_of(const fs::path& folder, const Group& group, std::si
     if (unpadded > kClearly * decimal) return Fraction::kDecimal;
   }
   return Error{folder.string(), "",
-               fmt::format("seconds with {} and with {} digits behind the point ({}, {})", digits(*least).size(),
+               fmt::format("seconds with {} and with {} digits after the point ({}, {})", digits(*least).size(),
                            longest, least->file.filename().string(), most->file.filename().string()),
-               "as many digits in all names: these are decimals, or whole numbers without their zeros"};
+               "the same number of digits after the point in all names: it is unclear at which end zeros were dropped"};
 }
 
 std::string example_names(const Group& group) {
@@ -221,16 +224,17 @@ std::vector<fs::path> image_files_of(const fs::path& folder) {
   std::vector<fs::path> files;
   std::error_code error;
   for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
-    if (is_one_of(kind_of(it->path()), {"png", "jpg", "jpeg", "webp", "pgm", "ppm", "pnm", "bmp", "tif", "tiff"}) &&
-        !it->path().filename().string().starts_with('.'))
+    if (image_files::is_image_name(it->path()) && !it->path().filename().string().starts_with('.'))
       files.push_back(it->path());
   }
   std::ranges::sort(files);
   return files;
 }
 
-bool may_be_image(const fs::path& file) {
-  return is_one_of(kind_of(file), {"gif", "jp2", "exr", "hdr", "dng", "raw", "tga", "heic", "avif", "jxl", "pfm"});
+bool is_undecodable_image(const fs::path& file) {
+  constexpr std::array<std::string_view, 11> kKinds = {"gif", "jp2",  "exr",  "hdr", "dng", "raw",
+                                                       "tga", "heic", "avif", "jxl", "pfm"};
+  return std::ranges::find(kKinds, kind_of(file)) != kKinds.end();
 }
 
 bool naturally_before(const std::string& a, const std::string& b) {
@@ -249,7 +253,7 @@ bool naturally_before(const std::string& a, const std::string& b) {
 }
 
 Result<NamedImages> images_by_name(const fs::path& folder, const std::vector<fs::path>& files) {
-  const std::map<Kind, Group> kinds = kinds_of(files);
+  const Kinds kinds = kinds_of(files);
   const auto chosen = chosen_kind(folder, kinds);
   if (!chosen) return chosen.error();
   auto out = read_names(folder, **chosen);

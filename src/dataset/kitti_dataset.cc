@@ -120,7 +120,8 @@ bool looks_like_kitti(const fs::path& folder) {
 RecordingResult open_kitti(const fs::path& folder) {
   std::vector<int> cameras = cameras_in(folder);
   if (cameras.empty())
-    return Error{folder.string(), "", "no camera", "image_0 to image_3 with times.txt and calib.txt"};
+    return Error{folder.string(), "", "no camera",
+                 "at least one folder of image_0 ... image_3, with times.txt and calib.txt"};
   return std::unique_ptr<Recording>(std::make_unique<KittiRecording>(folder, std::move(cameras)));
 }
 

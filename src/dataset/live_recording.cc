@@ -16,7 +16,7 @@ namespace {
 constexpr int kMaxNumber = 1000;
 constexpr const char *kTopics = "topics", *kCameras = "cameras";
 
-// The numbers in a list such as "0,2"; empty if it is no list of `count` different numbers.
+// The numbers in a list such as "0,2"; empty unless it contains exactly `count` distinct numbers from 0 to kMaxNumber.
 std::vector<int> parse_numbers(const std::string& text, std::size_t count) {
   std::vector<int> out;
   for (const std::string& part : split(text, ',')) {
@@ -64,8 +64,9 @@ std::optional<LiveRecording> live_recording_of(const containers::MessageFile& fi
   } else if (reading->cameras.size() == out.topics.size()) {
     out.cameras = std::move(reading->cameras);
   } else {
-    out.warnings.push_back(fmt::format("{}: a rig of {} cameras for {} topics, which is not used", file.path().string(),
-                                       reading->cameras.size(), out.topics.size()));
+    out.warnings.push_back(
+        fmt::format("{}: the rig in the recording has {} cameras, but there are {} topics; the rig is not used",
+                    file.path().string(), reading->cameras.size(), out.topics.size()));
   }
   return out;
 }

@@ -16,8 +16,9 @@ constexpr const char* kLiveMetadata = "bslam.live";  // name of the metadata
 constexpr const char* kLiveRigFile = "rig.yaml";     // name of the attachment, in the format of bslam
 
 struct LiveRecording {
-  std::vector<std::string> topics;         // topics of the cameras of the rig, in its order
-  std::vector<int> numbers;                // for each topic: index of the camera in the rig file
+  std::vector<std::string> topics;  // topics of the cameras of the rig, in its order
+  // For each topic: index of the camera in the rig file; empty if missing or invalid.
+  std::vector<int> numbers;
   std::vector<camera::RigCamera> cameras;  // for each topic: the calibration; empty if the rig cannot be read
   std::vector<std::string> warnings;       // reasons for the user why the rig cannot be read
 

@@ -1,18 +1,16 @@
 #include "dataset/training_images.h"
 
 #include <algorithm>
-#include <array>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
 #include <set>
-#include <string_view>
 #include <system_error>
 #include <utility>
 
 #include "base/atomic_file.h"
-#include "base/lower_case.h"
 #include "image_decoding/image_file.h"
+#include "image_files/image_folder.h"
 
 namespace bslam::dataset {
 namespace {
@@ -20,19 +18,13 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMaxImageBytes = std::size_t{1} << 28;
-constexpr std::array<std::string_view, 5> kExtensions{".png", ".jpg", ".jpeg", ".pgm", ".webp"};
-
-bool is_image_name(const fs::path& path) {
-  const std::string extension = lower_case(path.extension().string());
-  return std::find(kExtensions.begin(), kExtensions.end(), extension) != kExtensions.end();
-}
 
 Result<std::vector<fs::path>> images_below(const fs::path& folder) {
   std::vector<fs::path> found;
   std::error_code error;
   for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
     std::error_code unreadable;
-    if (is_image_name(it->path()) && it->is_regular_file(unreadable)) found.push_back(it->path());
+    if (image_files::is_image_name(it->path()) && it->is_regular_file(unreadable)) found.push_back(it->path());
   }
   if (error) return Error{folder.string(), "", error.message(), "a folder that can be searched"};
   std::sort(found.begin(), found.end());
@@ -66,8 +58,8 @@ Result<std::vector<fs::path>> find_images(const std::vector<std::string>& paths)
       for (const fs::path& image : *below) take(image);
     } else if (!fs::exists(status)) {
       return Error{path, "", error ? error.message() : "No such file or directory", "an image or a folder of images"};
-    } else if (!is_image_name(path)) {
-      return Error{path, "", "a file of another type", "a PNG, JPEG, PGM or WebP image, or a folder"};
+    } else if (!image_files::is_image_name(path)) {
+      return Error{path, "", "a file of another type", "a PNG, JPEG, WebP, PNM, BMP or TIFF image, or a folder"};
     } else {
       take(path);
     }
@@ -80,7 +72,8 @@ Result<image::Image> read_training_image(const fs::path& file, int max_side) {
   if (!bytes) return bytes.error();
   auto image = image_decoding::decode_grey(*bytes);
   if (!image)
-    return Error{file.string(), "", "an incomplete image or another format", "a PNG, JPEG, PGM or WebP image"};
+    return Error{file.string(), "", "an incomplete image or another format",
+                 "a PNG, JPEG, WebP, PNM, BMP or TIFF image"};
   const bool large = max_side > 0 && std::max(image->width(), image->height()) > max_side;
   return large ? shrink(*image, max_side) : *std::move(image);
 }

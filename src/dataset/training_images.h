@@ -10,9 +10,9 @@
 
 namespace bslam::dataset {
 
-// Returns the PNG, JPEG, PGM and WebP files in `paths`, and the files with such names in folders in `paths` and their
-// subfolders. The files of a folder are ordered by path; duplicates are removed. Errors: a path that does not exist or
-// cannot be searched; a file of another type.
+// Returns the PNG, JPEG, WebP, PNM, BMP and TIFF files in `paths`, and the files with such names in folders in `paths`
+// and their subfolders. The files of a folder are ordered by path; duplicates are removed. Errors: a path that does not
+// exist or cannot be searched; a file of another type.
 Result<std::vector<std::filesystem::path>> find_images(const std::vector<std::string>& paths);
 
 // Reads a grey image and scales it down by averaging so that no side is longer than `max_side` pixels (0: no limit).

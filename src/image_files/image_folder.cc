@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <string_view>
 #include <system_error>
 
 #include "base/atomic_file.h"
@@ -14,10 +16,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool is_image_name(const fs::path& path) {
-  const std::string extension = lower_case(path.extension().string());
-  return extension == ".png" || extension == ".jpg" || extension == ".jpeg";
-}
+// The extensions of the images that can be decoded.
+constexpr std::array<std::string_view, 3> kPngOrJpeg = {".png", ".jpg", ".jpeg"};
+constexpr std::array<std::string_view, 7> kOthers = {".webp", ".pgm", ".ppm", ".pnm", ".bmp", ".tif", ".tiff"};
 
 std::string images_text(std::size_t count) { return fmt::format("{} image{}", count, count == 1 ? "" : "s"); }
 
@@ -58,6 +59,15 @@ std::string steps_back_text(const std::vector<ImageFile>& images, StampUnit unit
 
 }  // namespace
 
+bool is_image_name(const fs::path& file) {
+  return is_png_or_jpeg_name(file) ||
+         std::ranges::find(kOthers, lower_case(file.extension().string())) != kOthers.end();
+}
+
+bool is_png_or_jpeg_name(const fs::path& file) {
+  return std::ranges::find(kPngOrJpeg, lower_case(file.extension().string())) != kPngOrJpeg.end();
+}
+
 std::string name_of(const ImageFile& image) {
   return image.store ? image.store->name(image.entry) : image.path.string();
 }
@@ -94,7 +104,7 @@ std::vector<NumberedImage> images_in(const fs::path& folder) {
   std::error_code error;
   for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
     const std::string stem = it->path().stem().string();
-    if (!is_image_name(it->path()) || stem.find_first_not_of("0123456789") != std::string::npos) continue;
+    if (!is_png_or_jpeg_name(it->path()) || stem.find_first_not_of("0123456789") != std::string::npos) continue;
     if (const auto number = parse_integer(stem)) images.push_back({*number, it->path()});
   }
   std::sort(images.begin(), images.end(), [](const NumberedImage& a, const NumberedImage& b) {

@@ -26,6 +26,11 @@ struct ImageFile {
   std::optional<TimeNs> frame_ns = {};
 };
 
+// Returns true if a file has the name of an image of a kind that can be decoded.
+bool is_image_name(const std::filesystem::path& file);
+// The same for PNG and JPEG only.
+bool is_png_or_jpeg_name(const std::filesystem::path& file);
+
 // Text for messages: the file of an image, or its location in a recording.
 std::string name_of(const ImageFile& image);
 // Text for messages: the folder or the topic of an image.

@@ -66,7 +66,8 @@ Result<std::int64_t> YamlMap::integer(std::string_view key) const {
 
 Result<std::string> YamlMap::text(std::string_view key) const {
   const YAML::Node node = at(key);
-  if (!node.IsDefined() || !node.IsScalar() || node.Scalar().empty()) return error(key, describe(node), "text");
+  if (!node.IsDefined() || !node.IsScalar() || node.Scalar().empty())
+    return error(key, describe(node), "text that is not empty");
   return node.Scalar();
 }
 

@@ -199,7 +199,7 @@ TEST_F(ImageFolders, NamesOfSecondsMayLackZerosOnOneSide) {
 TEST_F(ImageFolders, NamesOfSecondsWithZerosOnBothSidesAreAskedAbout) {
   const char* const names[] = {"7.012", "7.070", "7.122345", "7.173211", "7.223100", "7.273000"};
   add("cam0", [&](int k) { return std::string(names[k]) + ".png"; });
-  expect_error(open({"a"}), "expected as many digits in all names");
+  expect_error(open({"a"}), "expected the same number of digits after the point in all names");
 }
 
 TEST_F(ImageFolders, NamesOfSeveralKindsAreAskedAbout) {
@@ -210,6 +210,30 @@ TEST_F(ImageFolders, NamesOfSeveralKindsAreAskedAbout) {
   fs::remove_all(data());
   fs::rename(folder_.path() / "both", data());
   expect_error(open({"a", "b"}), "found images with names of several kinds");  // rather than the number of folders
+}
+
+TEST_F(ImageFolders, NamesOfDigitsTakePrecedenceWithEveryExtension) {
+  for (const std::string kind : {".png", ".webp", ".bmp"}) {
+    fs::remove_all(data());
+    add("cam0", [&](int k) { return std::to_string(1'000'000'000'000 + 50'000'000LL * k) + kind; });
+    for (const char* preview : {"preview_1", "preview_2"})
+      support::write_image(data() / "cam0" / (preview + kind), 60, 20);
+    const auto dataset = open({"a"});
+    ASSERT_TRUE(dataset) << kind << ": " << dataset.error().message();
+    EXPECT_EQ(dataset->frames.size(), static_cast<std::size_t>(kImages));
+    EXPECT_TRUE(has_text(dataset->warnings, "2 files that look like images are not used"));
+  }
+}
+
+TEST_F(ImageFolders, NamesOfDigitsMayHaveOneExtensionBesidePngAndJpeg) {
+  const auto name = [](int k) { return std::to_string(1'000'000'000'000 + 50'000'000LL * k); };
+  add("cam0", [&](int k) { return name(k) + ".bmp"; });
+  add("cam0", [&](int k) { return name(k) + ".webp"; });
+  expect_error(open({"a"}), "found images with names of several kinds");
+  add("cam0", [&](int k) { return name(k) + (k % 2 == 0 ? ".png" : ".jpg"); });
+  const auto dataset = open({"a"});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(dataset->frames.size(), static_cast<std::size_t>(kImages));
 }
 
 TEST_F(ImageFolders, NamesWithSeveralNumbersAreAskedAbout) {

@@ -31,8 +31,9 @@ TEST(TrainingImages, RejectOtherFiles) {
 
 TEST(TrainingImages, AreReadInAllFormats) {
   const support::TemporaryFolder folder;
-  for (const char* name : {"a.png", "b.jpg", "c.pgm", "d.webp"}) {
+  for (const char* name : {"a.png", "b.jpg", "c.pgm", "d.webp", "e.bmp", "f.pnm", "g.tif", "h.tiff"}) {
     support::write_image(folder.path() / name, 60, 40);
+    EXPECT_EQ(find_images({folder.path().string()})->back(), folder.path() / name);
     const auto image = read_training_image(folder.path() / name, 0);
     ASSERT_TRUE(image.ok()) << name << ": " << image.error().message();
     EXPECT_EQ(image->width(), 60);
