@@ -110,11 +110,11 @@ std::vector<std::optional<geometry::PoseUncertainty>> uncertainties_of(
 
 BundleSummary adjust(ReprojectionProblem& problem, const BundleOptions& options, std::span<const std::uint8_t> skip,
                      std::stop_token stop) {
-  const auto count = [&](std::uint8_t free) {
-    return std::count(problem.pose_free.begin(), problem.pose_free.end(), free);
-  };
-  BSLAM_ASSERT(problem.pose_free.empty() || count(0) > 0, "at least one pose must be fixed");
   const std::vector<double> chi2 = squared_errors(problem);
+  BSLAM_ASSERT(problem.pose_free.empty() || std::ranges::find(problem.pose_free, 0) != problem.pose_free.end(),
+               "at least one pose must be fixed");
+  BSLAM_ASSERT(options.fixed_effects.empty() || options.fixed_effects.size() == problem.T_rig_world.size(),
+               "fixed_effects must have one entry per pose");
   const BundleStructure structure = make_structure(problem, chi2, skip);
   if (structure.num_points() == 0) return {};
   const Kernel kernel = options.robust ? Kernel::kHuber : Kernel::kNone;
@@ -131,7 +131,32 @@ BundleSummary adjust(ReprojectionProblem& problem, const BundleOptions& options,
   return summary;
 }
 
+void check_problem(const ReprojectionProblem& problem) {
+  using Observation = ReprojectionProblem::Observation;
+  BSLAM_ASSERT(problem.rig != nullptr, "the problem must have a rig");
+  const std::size_t poses = problem.T_rig_world.size();
+  BSLAM_ASSERT(problem.pose_free.size() == poses, "pose_free must have one entry per pose");
+  BSLAM_ASSERT(problem.motion.empty() || problem.motion.size() == poses * problem.rig->size(),
+               "motion must have one entry per pose and camera");
+  BSLAM_ASSERT(problem.twist.empty() || problem.twist.size() == poses, "twist must have one entry per pose");
+  const Observation* last = nullptr;
+  for (const Observation& o : problem.observations) {
+    BSLAM_ASSERT(o.pose >= 0 && o.pose < static_cast<int>(poses) && o.point >= 0 &&
+                     o.point < static_cast<int>(problem.points.size()),
+                 "an observation must refer to a pose and a point of the problem");
+    BSLAM_ASSERT(o.camera.valid() && o.camera.index() < problem.rig->size(),
+                 "an observation must refer to a camera of the rig");
+    BSLAM_ASSERT(o.sigma > 0, "standard deviations must be positive");
+    BSLAM_ASSERT(
+        last == nullptr || last->point < o.point ||
+            (last->point == o.point && (last->pose < o.pose || (last->pose == o.pose && last->camera <= o.camera))),
+        "observations must be sorted by point, pose and camera");
+    last = &o;
+  }
+}
+
 std::vector<double> squared_errors(const ReprojectionProblem& problem) {
+  BSLAM_ASSERT(problem.rig != nullptr, "the problem must have a rig");
   return squared_errors(problem, problem.T_rig_world, problem.points, RigValues::of(*problem.rig));
 }
 
@@ -143,6 +168,9 @@ std::vector<std::uint8_t> beyond(const std::vector<double>& chi2, double bound) 
 
 std::vector<double> squared_errors(const ReprojectionProblem& problem, std::span<const SE3> T_rig_world,
                                    std::span<const Vector3d> points, const RigValues& rig) {
+  check_problem(problem);
+  BSLAM_ASSERT(T_rig_world.size() == problem.T_rig_world.size() && points.size() == problem.points.size(),
+               "there must be one pose and one point for each of the problem's");
   std::vector<double> out;
   out.reserve(problem.observations.size());
   for (const ReprojectionProblem::Observation& o : problem.observations) {

@@ -46,7 +46,8 @@ struct BundleOptions {
   // A square root L, (n, any), of the covariance L L^T of the calibration, which the adjustment keeps constant. Rows:
   // rotation (rad) and translation (m) of cameras 1 to N-1, then the intrinsics of all cameras. Null if it is exact.
   std::shared_ptr<const Eigen::MatrixXd> rig_deviation = {};
-  // The effect of the calibration error L z, z ~ N(0, I), on each fixed pose; free poses have no columns. Empty: none.
+  // Per pose: the effect of the calibration error L z, z ~ N(0, I), on a fixed pose; free poses have no columns. Empty:
+  // none.
   // A fixed pose keeps its value in the adjustment, but with another calibration it would have had another value.
   std::vector<geometry::PoseUncertainty::Effect> fixed_effects = {};
   // If the calibration has not been compared with images yet: the inverse of its covariance, (n, n). The images of the
@@ -72,6 +73,10 @@ struct BundleSummary : LmSummary {
 // deterministic.
 BundleSummary adjust(ReprojectionProblem& problem, const BundleOptions& options,
                      std::span<const std::uint8_t> skip = {}, std::stop_token stop = {});
+
+// Asserts that the sizes of a problem fit together and that its observations are in order and refer to its poses,
+// points and cameras. Every function that reads the observations of a problem does this first.
+void check_problem(const ReprojectionProblem& problem);
 
 // Squared normalised error of each observation at the problem's values; infinite if it does not project.
 std::vector<double> squared_errors(const ReprojectionProblem& problem);

@@ -7,29 +7,6 @@ namespace {
 
 using Observation = ReprojectionProblem::Observation;
 
-void check(const ReprojectionProblem& problem, std::span<const std::uint8_t> skip) {
-  BSLAM_ASSERT(problem.rig != nullptr, "the problem must have a rig");
-  BSLAM_ASSERT(problem.pose_free.size() == problem.T_rig_world.size(), "pose_free must have one entry per pose");
-  BSLAM_ASSERT(skip.empty() || skip.size() == problem.observations.size(), "skip must have one entry per observation");
-  BSLAM_ASSERT(problem.motion.empty() || problem.motion.size() == problem.T_rig_world.size() * problem.rig->size(),
-               "motion must have one entry per pose and camera");
-  const auto num_poses = static_cast<int>(problem.T_rig_world.size());
-  const auto num_points = static_cast<int>(problem.points.size());
-  const Observation* last = nullptr;
-  for (const Observation& o : problem.observations) {
-    BSLAM_ASSERT(o.pose >= 0 && o.pose < num_poses && o.point >= 0 && o.point < num_points,
-                 "an observation must refer to a pose and a point of the problem");
-    BSLAM_ASSERT(o.camera.valid() && o.camera.index() < problem.rig->size(),
-                 "an observation must refer to a camera of the rig");
-    BSLAM_ASSERT(o.sigma > 0, "standard deviations must be positive");
-    BSLAM_ASSERT(
-        last == nullptr || last->point < o.point ||
-            (last->point == o.point && (last->pose < o.pose || (last->pose == o.pose && last->camera <= o.camera))),
-        "observations must be sorted by point, pose and camera");
-    last = &o;
-  }
-}
-
 // Terms, groups and points; the slots of poses are not set yet.
 void gather(const ReprojectionProblem& problem, const std::vector<double>& chi2, std::span<const std::uint8_t> skip,
             BundleStructure& out) {
@@ -99,7 +76,9 @@ void number_pairs(BundleStructure& s) {
 
 BundleStructure make_structure(const ReprojectionProblem& problem, const std::vector<double>& chi2,
                                std::span<const std::uint8_t> skip) {
-  check(problem, skip);
+  check_problem(problem);
+  BSLAM_ASSERT(chi2.size() == problem.observations.size(), "there must be one squared error per observation");
+  BSLAM_ASSERT(skip.empty() || skip.size() == problem.observations.size(), "skip must have one entry per observation");
   BundleStructure out;
   out.terms.reserve(problem.observations.size());
   out.groups.reserve(problem.observations.size() + 1);

@@ -358,6 +358,32 @@ TEST(BundleAdjusterDeathTest, RejectsAProblemWithoutAFixedPose) {
   EXPECT_DEATH(adjust(scene->problem, {}), "fixed");
 }
 
+TEST(BundleAdjusterDeathTest, RejectsAProblemWhoseSizesDoNotFit) {
+  Random random(13);
+  const auto scene = scene::make_bundle_scene(BundleSpec{}, random);
+  const ReprojectionProblem& good = scene->problem;
+  const auto with = [&](const auto& change) {
+    ReprojectionProblem problem = good;
+    change(problem);
+    return problem;
+  };
+  const auto dies = [](ReprojectionProblem problem, const char* message) {
+    EXPECT_DEATH(adjust(problem, {}), message);
+    EXPECT_DEATH(static_cast<void>(squared_errors(problem)), message);
+  };
+  dies(with([](ReprojectionProblem& p) { p.rig = nullptr; }), "must have a rig");
+  dies(with([](ReprojectionProblem& p) { p.twist.resize(p.T_rig_world.size() - 1); }), "twist");
+  dies(with([](ReprojectionProblem& p) { p.motion.resize(1); }), "motion");
+  dies(with([](ReprojectionProblem& p) { p.pose_free.pop_back(); }), "pose_free");
+  dies(with([](ReprojectionProblem& p) { p.points.pop_back(); }), "a pose and a point");
+  ReprojectionProblem problem = good;
+  BundleOptions options;
+  options.fixed_effects.resize(problem.T_rig_world.size() + 1);
+  EXPECT_DEATH(adjust(problem, options), "fixed_effects");
+  EXPECT_DEATH(static_cast<void>(squared_errors(problem, problem.T_rig_world, {}, RigValues::of(*problem.rig))),
+               "one pose and one point");
+}
+
 TEST(SquaredErrors, AreNormalisedAndInfiniteBehindTheCamera) {
   const Rig rig = scene::make_rig(1, Models::kPinhole);
   ReprojectionProblem problem;
