@@ -17,7 +17,9 @@ struct PoseObservation {
 };
 
 struct PoseSolverOptions {
-  int rounds = 4;  // optimisation rounds with reclassification of outliers between them; the last one has no kernel
+  // Optimisation rounds with reclassification of outliers between them. The last of two or more has no kernel; a single
+  // one has it. 0: the observations are only classified at the initial pose.
+  int rounds = 4;
   int iterations = 10;   // maximum number of Gauss-Newton steps per round
   int min_inliers = 10;  // minimum number of inliers of a pose
   double first_chi2 =
@@ -57,7 +59,8 @@ struct PoseSolution {
 };
 
 // Rounds with Huber kernel, each after a reclassification of all observations by chi-square (95 %, two degrees of
-// freedom), which may readmit outliers; the last round uses the inliers without kernel. Observations may have any
+// freedom), which may readmit outliers; the last of two or more rounds uses the inliers without kernel. Without rounds
+// the solution is the initial pose, with its inliers, their information and their errors. Observations may have any
 // order. Deterministic; the order of the observations within a camera determines the order of summation. If the result
 // is not ok, the pose must not be used.
 PoseSolution solve_pose(const Rig& rig, std::span<const PoseObservation> observations, const SE3& T_rig_world_initial,

@@ -73,8 +73,9 @@ struct ReprojectionResidual {
 };
 
 // If observations with two degrees of freedom are truncated at their 95 % bound c, a fraction 0.95 of them remains.
-// Their variance (and its derivative) is 1 - exp(-c/2) (1 + c/2) = 0.80 of that of all. Covariances from the normal
-// equations of the remaining observations are therefore too small by 0.80 / 0.95 (docs/math.md, section 4).
+// The sum of their squares (and its derivative) is 1 - exp(-c/2) (1 + c/2) = 0.80 of that of all, so that their
+// variance is 0.80 / 0.95 of that of all. Covariances from the normal equations of the remaining observations are too
+// small by the same factor (docs/math.md, section 4).
 constexpr double kFractionLeft = 0.95, kVarianceLeft = 0.80;
 
 // Bound of chi-square with two degrees of freedom at 95 %.
