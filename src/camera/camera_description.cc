@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/max_image_side.h"
 #include "base/number_text.h"
 #include "base/timestamp.h"
 #include "camera/model_table.h"
@@ -19,7 +20,6 @@ using geometry::Matrix3d;
 using geometry::SE3;
 using geometry::Vector3d;
 
-constexpr std::int64_t kMaxSidePx = 20000;
 constexpr double kMaxTranslation = 1e6;      // metres; a larger value is a unit mistake or a broken file
 constexpr double kMaxTimeOffset = 1e6;       // seconds; keeps sums of nanoseconds far from overflow
 constexpr double kMaxReadout = 1.0;          // seconds
@@ -70,8 +70,8 @@ Status check_numbers(const CameraDescription& d, const DescriptionKeys& keys) {
     return Error{keys.file, keys.resolution, fmt::format("{} numbers", d.resolution.size()), "width and height"};
   }
   for (const std::int64_t side : d.resolution) {
-    if (side < 1 || side > kMaxSidePx) {
-      return Error{keys.file, keys.resolution, std::to_string(side), fmt::format("pixels in [1, {}]", kMaxSidePx)};
+    if (side < 1 || side > kMaxImageSidePx) {
+      return Error{keys.file, keys.resolution, std::to_string(side), fmt::format("pixels in [1, {}]", kMaxImageSidePx)};
     }
   }
   if (d.intrinsics.size() != 4) {

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <utility>
 
+#include "base/max_image_side.h"
 #include "image_decoding/image_file.h"
 #include "image_files/image_size.h"
 
@@ -48,7 +49,6 @@ const Encoding* find_encoding(std::string_view name) {
 }
 
 constexpr std::size_t kBeginning = 512;  // bytes that contain everything before the pixels, unless names are very long
-constexpr std::uint32_t kMaxSidePx = 20000;
 
 }  // namespace
 
@@ -88,8 +88,8 @@ std::vector<ImageTopic> BagStore::find_images() {
     std::ranges::stable_sort(topic.images, {}, &BagImage::received_ns);
     if (const auto reference = first.find(&topic); reference != first.end()) {
       topic.encoding = reference->second.encoding;
-      topic.width = static_cast<int>(std::min(reference->second.width, kMaxSidePx + 1));
-      topic.height = static_cast<int>(std::min(reference->second.height, kMaxSidePx + 1));
+      topic.width = static_cast<int>(std::min<std::uint32_t>(reference->second.width, kMaxImageSidePx + 1));
+      topic.height = static_cast<int>(std::min<std::uint32_t>(reference->second.height, kMaxImageSidePx + 1));
     }
     describe_first(topic);
     out.push_back(std::move(topic));
@@ -148,7 +148,7 @@ Result<StoredImage> BagStore::read(std::int64_t number) const {
   if (image->compressed) return out;
   const Encoding* encoding = find_encoding(image->encoding);
   if (encoding == nullptr) return Error{name(number), "", "encoding " + image->encoding, "a supported encoding"};
-  if (image->width < 1 || image->height < 1 || image->width > kMaxSidePx || image->height > kMaxSidePx)
+  if (image->width < 1 || image->height < 1 || image->width > kMaxImageSidePx || image->height > kMaxImageSidePx)
     return Error{name(number), "", fmt::format("{}x{} pixels", image->width, image->height), "1 to 20000 pixels"};
   out.layout = encoding->layout;
   out.bytes_per_value = encoding->bytes_per_value;

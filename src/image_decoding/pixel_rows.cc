@@ -4,13 +4,13 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "base/max_image_side.h"
+
 namespace bslam::image_decoding {
 namespace {
 
 using image_files::PixelLayout;
 using image_files::StoredImage;
-
-constexpr int kMaxSidePx = 20000;
 
 // Values from one pixel to the next.
 int channels_of(PixelLayout layout) {
@@ -43,7 +43,8 @@ int colour_conversion(PixelLayout layout) {
 }
 
 bool fits(const StoredImage& image) {
-  if (image.width < 1 || image.height < 1 || image.width > kMaxSidePx || image.height > kMaxSidePx) return false;
+  if (image.width < 1 || image.height < 1 || image.width > kMaxImageSidePx || image.height > kMaxImageSidePx)
+    return false;
   const std::size_t row = static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.bytes_per_value) *
                           static_cast<std::size_t>(channels_of(image.layout));
   if (image.begin > image.bytes.size() || image.size > image.bytes.size() - image.begin) return false;

@@ -5,7 +5,7 @@
 namespace bslam::image_files {
 namespace {
 
-constexpr int kMaxSidePx = 1 << 20;
+constexpr int kMaxHeaderSidePx = 1 << 20;
 
 // Reads a big-endian number of `count` bytes.
 int number_at(std::string_view bytes, std::size_t at, std::size_t count) {
@@ -15,7 +15,7 @@ int number_at(std::string_view bytes, std::size_t at, std::size_t count) {
 }
 
 std::optional<ImageSize> sensible(int width, int height) {
-  if (width < 1 || height < 1 || width > kMaxSidePx || height > kMaxSidePx) return std::nullopt;
+  if (width < 1 || height < 1 || width > kMaxHeaderSidePx || height > kMaxHeaderSidePx) return std::nullopt;
   return ImageSize{width, height};
 }
 

@@ -11,6 +11,8 @@
 #include <string>
 #include <vector>
 
+#include "base/max_image_side.h"
+
 namespace bslam::image_files {
 namespace {
 
@@ -41,19 +43,16 @@ bool checksum_holds(const Chunk& chunk) {
   return libdeflate_crc32(0, chunk.type.data(), chunk.type.size() + chunk.data.size()) == chunk.checksum;
 }
 
-// The same limit as for cameras; bounds the memory that a damaged header can request.
-constexpr std::uint32_t kMaxSidePx = 20000;
-
 struct Header {
   int width = 0, height = 0;
 };
 
-// Returns nullopt unless the image is 8-bit grey without interlacing, with sides from 1 to kMaxSidePx.
+// Returns nullopt unless the image is 8-bit grey without interlacing, with sides from 1 to kMaxImageSidePx.
 std::optional<Header> read_header(const Chunk& chunk) {
   if (chunk.type != "IHDR" || chunk.data.size() != 13) return std::nullopt;
   const std::uint32_t width = big_endian(chunk.data.data()), height = big_endian(chunk.data.data() + 4);
   constexpr std::string_view kPlainGrey("\x08\x00\x00\x00\x00", 5);  // depth, colour, compression, filter, interlacing
-  if (width == 0 || height == 0 || width > kMaxSidePx || height > kMaxSidePx) return std::nullopt;
+  if (width == 0 || height == 0 || width > kMaxImageSidePx || height > kMaxImageSidePx) return std::nullopt;
   if (chunk.data.substr(8) != kPlainGrey) return std::nullopt;
   return Header{static_cast<int>(width), static_cast<int>(height)};
 }

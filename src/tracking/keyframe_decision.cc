@@ -20,7 +20,6 @@ constexpr std::size_t kMinLandmarks = 100;
 constexpr double kMinShared = 0.6;        // minimum fraction of the inliers that a similar keyframe observes
 constexpr std::size_t kNewest = 5;        // number of newest keyframes that do not count as a return
 constexpr double kSimilarParallax = 0.5;  // maximum parallax to it, relative to that of a new keyframe
-constexpr int kFewInliersInterval = 8;    // minimum number of frames between keyframes due to a camera with few inliers
 
 bool untracked_depth(const frame::BundledFrame& frame, const FrameMatches& inliers,
                      const InitialisationOptions& options) {

@@ -9,6 +9,10 @@
 
 namespace bslam::tracking {
 
+// Number of frames after a keyframe after which a camera with few inliers makes the next one due; while tracking is
+// direct, the number of frames after which features are extracted because of such a camera.
+inline constexpr int kFewInliersInterval = 8;
+
 struct KeyframeEvidence {
   int frames_since_keyframe = 0;
   int overlap = 0;       // landmarks of the reference keyframe among the inliers

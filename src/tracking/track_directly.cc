@@ -17,9 +17,6 @@ using geometry::SE3;
 // Minimum fraction of the aligned landmarks that agree with the pose. With fewer, the frame is tracked with features,
 // which distinguish several motions. In a new map, most landmarks may be on a moving object.
 constexpr double kMinInlierRatio = 0.5, kMinRatioAtStart = 0.8;
-// Features are extracted after this number of frames if a camera has few inliers, because it may observe a new part of
-// the scene.
-constexpr int kFewInliersInterval = 8;
 
 // Landmarks aligned in the images of a frame.
 struct AlignedLandmarks {
@@ -123,6 +120,7 @@ bool support_is_low(const frame::BundledFrame& frame, const FrameMatches& inlier
     int& best = state.best_inliers[c];
     best = std::max(best, found);
     low |= best >= options.consensus.min_expected && found < options.direct.min_support * best;
+    // The camera may observe a new part of the scene.
     low |= found < options.keyframe.min_camera_inliers && state.frames >= kFewInliersInterval;
   }
   ++state.frames;

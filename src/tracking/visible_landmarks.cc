@@ -12,7 +12,6 @@ namespace {
 
 using geometry::SE3;
 
-constexpr double kMaxViewAngle = 1.05;  // rad, as in ProjectionSearchOptions
 // Number of frames for which a local view is used while the map does not change.
 constexpr int kFramesOfView = 8;
 
@@ -22,10 +21,11 @@ void add_visible(const TrackInput& input, const frame::BundledFrame& frame, cons
                  std::span<const LandmarkId> landmarks, std::span<const matching::SearchPoint> points,
                  std::span<const std::uint8_t> skip, std::size_t first, ThreadPool& pool, Candidates& out) {
   const camera::Rig rig = frame::rig_of(input.map.rig(), frame);
+  const double max_view_angle = matching::ProjectionSearchOptions{}.max_view_angle;
   pool.for_each(rig.size(), [&](std::size_t c) {
     if (frame.cameras[c].state != image::ImageState::kPresent) return;
     const SE3 T_cam_world = rig.cam_from_rig(c) * T_rig_world;
-    for (const auto& v : matching::visible_points(rig, CameraIndex(c), T_cam_world, points, kMaxViewAngle)) {
+    for (const auto& v : matching::visible_points(rig, CameraIndex(c), T_cam_world, points, max_view_angle)) {
       if (!skip.empty() && skip[v.point]) continue;
       out[c].push_back({landmarks[v.point], v.pixel, points[v.point].max_distance / v.distance,
                         static_cast<std::uint32_t>(first + v.point)});

@@ -10,6 +10,7 @@
 #include <system_error>
 #include <utility>
 
+#include "base/max_image_side.h"
 #include "video/ffmpeg.h"
 
 namespace bslam::video {
@@ -19,7 +20,6 @@ namespace {
 constexpr std::size_t kCachedImages = 24, kCachedBytes = std::size_t{1} << 26;
 // Number of images; for larger distances seeking is faster than decoding all images in between.
 constexpr std::size_t kFarAhead = 200;
-constexpr int kMaxSidePx = 20000;
 
 // Everything of one open file; released in the order FFmpeg needs.
 class Decoder {
@@ -150,7 +150,8 @@ std::optional<std::int64_t> Decoder::next_image() {
 }
 
 std::optional<VideoImage> Decoder::grey() {
-  if (damaged_ || frame_->width < 1 || frame_->height < 1 || frame_->width > kMaxSidePx || frame_->height > kMaxSidePx)
+  if (damaged_ || frame_->width < 1 || frame_->height < 1 || frame_->width > kMaxImageSidePx ||
+      frame_->height > kMaxImageSidePx)
     return std::nullopt;
   scaler_ =
       f_.sws_getCachedContext(scaler_, frame_->width, frame_->height, static_cast<AVPixelFormat>(frame_->format),
