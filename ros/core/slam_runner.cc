@@ -1,6 +1,7 @@
 #include "core/slam_runner.h"
 
 #include <algorithm>
+#include <exception>
 #include <filesystem>
 #include <utility>
 
@@ -113,8 +114,25 @@ void SlamRunner::reject(std::size_t camera, const bslam::Error& error) {
 
 void SlamRunner::run() {
   while (const auto images = synchronizer_->wait()) {
-    take_over();
-    process(*images);
+    try {
+      take_over();
+      process(*images);
+    } catch (const std::exception& error) {  // of an output, or for lack of memory; the next frame may succeed
+      note_failure(error.what());
+    }
+  }
+}
+
+// The outputs of a node may throw, such as when ROS shuts down. No exception may leave the thread.
+void SlamRunner::note_failure(const std::string& what) {
+  const std::string text = "a frame was not processed or not published: " + what;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    failure_ = text;
+  }
+  try {
+    log(bslam::LogLevel::kWarning, text);
+  } catch (const std::exception&) {  // the diagnostics have it
   }
 }
 

@@ -68,6 +68,7 @@ class SlamRunner {
   void take_over();
   void keep_trajectory(const bslam::System& before);
   void process(const bslam::ImageBundle& images);
+  void note_failure(const std::string& what);
   void report_changes(const std::optional<bslam::FrameResult>& before, const bslam::FrameResult& now);
   void publish_cloud(const bslam::FrameResult& frame);
   void publish_path(const bslam::FrameResult& frame);
@@ -87,7 +88,7 @@ class SlamRunner {
   bool localize_only_ = false, next_localize_only_ = false;
   std::vector<CameraCounts> counts_;
   std::optional<bslam::FrameResult> last_;
-  std::string failure_;  // last error of System::process
+  std::string failure_;  // of the last frame: an error of System::process, or an exception
   std::size_t frames_ = 0, lost_ = 0;
   Clock::time_point last_frame_at_ = Clock::now();
 

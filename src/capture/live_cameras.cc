@@ -103,24 +103,28 @@ void LiveCameras::stop() {
 
 void LiveCameras::run(std::size_t c, const std::stop_token& stop) {
   std::exception_ptr failure;
+  bool last = false;
   try {
     capture(c, stop);
   } catch (...) {
     failure = std::current_exception();
   }
   cameras_[c].device.reset();
-  bool last = false;
   {
     const std::lock_guard lock(mutex_);
     last = --running_ == 0;
-    if (failure) failure_ = failure;
   }
   if (last) {
-    // Close() only returns errors of on_drop, which never fails.
-    [[maybe_unused]] const Status closed = synchronizer_->close();
-    collect();
+    try {
+      // Close() only returns errors of on_drop, which never fails.
+      [[maybe_unused]] const Status closed = synchronizer_->close();
+      collect();
+    } catch (...) {
+      failure = std::current_exception();
+    }
   }
   const std::lock_guard lock(mutex_);
+  if (failure) failure_ = failure;
   ended_ = ended_ || last || failure;
   changed_.notify_all();
 }

@@ -125,6 +125,16 @@ class ParallelExecutor : public StageExecutor {
   // The functions below must be called without mutex_.
 
   void work(Stage stage) {
+    try {
+      run_tasks(stage);
+    } catch (...) {  // of what is outside of a task, such as for lack of memory
+      const std::lock_guard lock(mutex_);
+      failure_ = std::current_exception();
+      close();
+    }
+  }
+
+  void run_tasks(Stage stage) {
     std::stop_token stop;
     while (std::optional<StageTask> task = take(stage, stop)) {
       bool committed = false;

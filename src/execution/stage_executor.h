@@ -11,9 +11,11 @@
 
 namespace bslam::execution {
 
-// All functions except interrupt() and over() must be called from one thread, the caller's. Any of these calls may
-// rethrow an exception of a stage; after that all of them do. An executor may be destroyed at any time: running stages
-// are stopped, waiting tasks are dropped.
+// All functions except interrupt() and over() must be called from one thread, the caller's. An exception of a stage is
+// thrown by a call of begin_frame(), commit(), enqueue(), drain() or restart(). With threads (parallel, lagged) all
+// further calls of these functions throw it again. Without threads (sequential, replay) only the call that ran the
+// stage throws it: the task and those that would follow are lost, so that a replayed run then differs from its journal.
+// An executor may be destroyed at any time: running stages are stopped, waiting tasks are dropped.
 class StageExecutor {
  public:
   virtual ~StageExecutor() = default;

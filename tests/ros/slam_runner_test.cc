@@ -7,6 +7,7 @@
 #include <condition_variable>
 #include <filesystem>
 #include <fstream>
+#include <stdexcept>
 
 #include "api/textured_wall.h"
 #include "support/data_on_disk.h"
@@ -124,6 +125,27 @@ TEST_F(RosRunner, PublishesPosesPointsPathAndTrajectory) {
   const std::string written = bslam::support::read_text((folder_.path() / "end.tum").string());
   EXPECT_EQ(written.rfind("# bslam trajectory frame=body parent=map final=true\n", 0), 0u) << written.substr(0, 100);
   EXPECT_FALSE(std::filesystem::exists((folder_.path() / "end_1.tum").string()));
+}
+
+TEST_F(RosRunner, OutputsMayThrow) {
+  Outputs outputs = published_.outputs();
+  outputs.pose = [this](const PoseOutput& p) {
+    published_.add(published_.poses, p);
+    throw std::runtime_error("nobody publishes");
+  };
+  outputs.log = [this](bslam::LogLevel, const std::string& line) {
+    published_.add(published_.lines, line);
+    if (line.rfind("a frame was not", 0) == 0) throw std::runtime_error("nobody logs");
+  };
+  const auto runner = SlamRunner::create(*rig_, parameters_, outputs);
+  ASSERT_TRUE(runner) << runner.error().message();
+  push(**runner, 0, 4, 0);
+  EXPECT_TRUE((*runner)->stop());
+  EXPECT_EQ(published_.poses.size(), 4u);
+  const auto line = std::find(published_.lines.begin(), published_.lines.end(),
+                              "a frame was not processed or not published: nobody publishes");
+  EXPECT_NE(line, published_.lines.end());
+  EXPECT_NE((*runner)->diagnostics()[0].message.find("nobody publishes"), std::string::npos);
 }
 
 TEST_F(RosRunner, ContinuesInALoadedMapWithTheSameOdometry) {
