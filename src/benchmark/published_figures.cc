@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <span>
 
 namespace bslam::benchmark {
 namespace {
@@ -42,7 +43,12 @@ constexpr PublishedRow kKittiRows[] = {
      {1.3, 10.4, 5.7, .6, .2, .8, .8, .5, 3.6, 3.2, 1.0}}};
 // clang-format on
 
-constexpr PublishedSuite kSuites[] = {{"EuRoC", kEurocSequences, kEurocRows}, {"KITTI", kKittiSequences, kKittiRows}};
+// A public set of sequences with figures.
+struct Suite {
+  std::span<const std::string_view> sequences;  // at most 11
+  std::span<const PublishedRow> rows;
+};
+constexpr Suite kSuites[] = {{kEurocSequences, kEurocRows}, {kKittiSequences, kKittiRows}};
 
 // Returns the letters and digits in lower case, without the difficulty that ends the names of EuRoC sequences.
 std::string plain_name(std::string_view name) {
@@ -60,12 +66,10 @@ std::string plain_name(std::string_view name) {
 
 }  // namespace
 
-std::span<const PublishedSuite> published_suites() { return kSuites; }
-
 std::vector<PublishedFigure> published_figures(std::string_view sequence_name) {
   const std::string name = plain_name(sequence_name);
   std::vector<PublishedFigure> figures;
-  for (const PublishedSuite& suite : kSuites) {
+  for (const Suite& suite : kSuites) {
     const auto found = std::ranges::find(suite.sequences, name);
     if (found == suite.sequences.end()) continue;
     const auto index = static_cast<std::size_t>(found - suite.sequences.begin());

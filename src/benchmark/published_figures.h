@@ -3,7 +3,6 @@
 
 #include <array>
 #include <optional>
-#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -23,21 +22,11 @@ struct PublishedRow {
   std::array<std::optional<double>, 11> ate_m;
 };
 
-// A public set of sequences with figures.
-struct PublishedSuite {
-  std::string_view name;
-  std::span<const std::string_view> sequences;  // at most 11
-  std::span<const PublishedRow> rows;
-};
-
 // The errors of one sequence, from the rows that have one for it.
 struct PublishedFigure {
   const PublishedRow* row;
   double ate_m;
 };
-
-// Returns all suites.
-std::span<const PublishedSuite> published_suites();
 
 // Returns the figures for a complete sequence with the usual name of its folder: MH_01_easy, MH01 or mh_01 for EuRoC,
 // 00 to 10 for KITTI odometry. Returns nothing for other names, such as those of extracts.

@@ -32,8 +32,6 @@ struct Camera {
 
   // The height of a row in the image: -1/2 for the first, 1/2 for the last.
   double relative_row(double pixel_y) const { return pixel_y / std::max(1, height - 1) - 0.5; }
-  // Exposure of the row at this height minus the exposure of the middle row, in seconds.
-  double row_delay_s(double pixel_y) const { return readout_s * relative_row(pixel_y); }
 
   // Angle in radians covered by one pixel at the principal point: 1 / mean focal length.
   double radians_per_pixel() const;

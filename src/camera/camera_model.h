@@ -58,8 +58,7 @@ class PinholeRadTan {
   std::optional<Vector3d> unproject(const Vector2d& pixel) const;
   const Intrinsics& intrinsics() const { return k_; }
   std::vector<double> distortion() const { return {d_.begin(), d_.begin() + count_}; }
-  double max_radius() const { return max_radius_; }  // tangent of the maximum valid angle, or infinity
-  int num_distortion() const { return count_; }      // size of distortion()
+  int num_distortion() const { return count_; }  // size of distortion()
   void distortion_jacobian(const Vector3d& point, Eigen::Ref<Matrix2Xd> J) const;
   static constexpr std::string_view kName = "pinhole-radtan";
 
@@ -79,7 +78,7 @@ class PinholeRadTan {
   Intrinsics k_;
   std::array<double, 8> d_{};  // k1 k2 p1 p2 k3 k4 k5 k6
   int count_ = 0;
-  double max_radius_ = 0;
+  double max_radius_ = 0;  // tangent of the maximum valid angle, or infinity
 };
 
 // Kannala-Brandt fisheye (PAMI 2006; OpenCV's fisheye, Kalibr's equidistant): r = theta (1 + k1 theta^2 + ... k4
@@ -93,7 +92,6 @@ class KannalaBrandt {
   std::optional<Vector3d> unproject(const Vector2d& pixel) const;
   const Intrinsics& intrinsics() const { return k_; }
   std::vector<double> distortion() const { return {d_.begin(), d_.end()}; }
-  double max_theta() const { return max_theta_; }      // radians
   static constexpr int num_distortion() { return 4; }  // size of distortion()
   void distortion_jacobian(const Vector3d& point, Eigen::Ref<Matrix2Xd> J) const;
   static constexpr std::string_view kName = "kannala-brandt";
@@ -101,7 +99,7 @@ class KannalaBrandt {
  private:
   Intrinsics k_;
   std::array<double, 4> d_{};
-  double max_theta_ = 0, max_r_ = 0;
+  double max_theta_ = 0, max_r_ = 0;  // radians
 };
 
 // Unified camera model (Geyer, Daniilidis 2000; Mei, Rives 2007; in the form of Usenko et al., 3DV 2018): a point is

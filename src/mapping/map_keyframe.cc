@@ -15,37 +15,35 @@ namespace {
 // measurement of the scale starts from its result.
 void adjust_locally(KeyframeId keyframe, const MappingOptions& options, const FeatureModel& features,
                     const std::shared_ptr<const Eigen::MatrixXd>& rig_prior, map::MapDraft& draft,
-                    const std::stop_token& stop, MappingReport& report) {
+                    const std::stop_token& stop) {
   // One estimate that contradicts a metric scale is not enough to make another one metric.
   const bool metric = draft.map().scale() == map::Scale::kMetric;
   const double deviation_before = metric ? std::numeric_limits<double>::infinity() : draft.map().scale_deviation();
+  ScaleReport scale;
   for (int round = 0; round < options.scale.rounds; ++round) {
-    report.scale = observe_scale(keyframe, options.scale, features, draft);
+    scale = observe_scale(keyframe, options.scale, features, draft);
     adjustment::Selection selection = needs_whole_submap(draft.map(), keyframe, options.scale)
                                           ? select_submap(draft.map(), keyframe)
                                           : select_local(draft.map(), keyframe, options.window);
     selection.rig_prior = rig_prior;
-    report.adjustment = adjustment::adjust_map(selection, options.local, features, draft, stop);
-    if (std::abs(report.scale.correction - 1.0) <= options.scale.converged_change || stop.stop_requested()) break;
+    adjustment::adjust_map(selection, options.local, features, draft, stop);
+    if (std::abs(scale.correction - 1.0) <= options.scale.converged_change || stop.stop_requested()) break;
   }
   const bool single_submap = draft.map().roots().size() == 1;  // the scale is a property of the whole map
-  if (single_submap && is_metric(report.scale, deviation_before, options.scale))
-    draft.set_scale(map::Scale::kMetric, report.scale.deviation);
+  if (single_submap && is_metric(scale, deviation_before, options.scale))
+    draft.set_scale(map::Scale::kMetric, scale.deviation);
 }
 
 }  // namespace
 
-MappingReport map_keyframe(KeyframeId keyframe, const MappingOptions& options, const FeatureModel& features,
-                           map::MapDraft& draft, std::stop_token stop,
-                           std::shared_ptr<const Eigen::MatrixXd> rig_prior) {
-  MappingReport report;
+void map_keyframe(KeyframeId keyframe, const MappingOptions& options, const FeatureModel& features,
+                  map::MapDraft& draft, std::stop_token stop, std::shared_ptr<const Eigen::MatrixXd> rig_prior) {
   complete_motion_of_root(keyframe, draft);
-  report.culled_landmarks = cull_landmarks(keyframe, options.culling, draft);
-  report.created = create_landmarks(keyframe, options.creation, features, draft);
-  report.fusion = fuse_landmarks(keyframe, options.fusion, features, draft);
-  adjust_locally(keyframe, options, features, rig_prior, draft, stop, report);
-  report.culled_keyframes = cull_keyframes(keyframe, options.culling, draft);
-  return report;
+  cull_landmarks(keyframe, options.culling, draft);
+  create_landmarks(keyframe, options.creation, features, draft);
+  fuse_landmarks(keyframe, options.fusion, features, draft);
+  adjust_locally(keyframe, options, features, rig_prior, draft, stop);
+  cull_keyframes(keyframe, options.culling, draft);
 }
 
 adjustment::AdjustmentReport adjust_globally(const MappingOptions& options, const FeatureModel& features,

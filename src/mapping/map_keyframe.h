@@ -10,19 +10,12 @@
 
 namespace bslam::mapping {
 
-struct MappingReport {
-  int culled_landmarks = 0, created = 0, culled_keyframes = 0;
-  FusionReport fusion;
-  ScaleReport scale;
-  adjustment::AdjustmentReport adjustment;
-};
-
 // Culls recent landmarks, creates new ones, fuses duplicates, estimates the scale if it is not known yet, adjusts the
 // local window, and culls redundant keyframes; all changes are made in `draft`. `keyframe` must be alive in it.
 // `rig_prior`: as in adjustment::Selection.
-MappingReport map_keyframe(KeyframeId keyframe, const MappingOptions& options, const FeatureModel& features,
-                           map::MapDraft& draft, std::stop_token stop = {},
-                           std::shared_ptr<const Eigen::MatrixXd> rig_prior = {});
+void map_keyframe(KeyframeId keyframe, const MappingOptions& options, const FeatureModel& features,
+                  map::MapDraft& draft, std::stop_token stop = {},
+                  std::shared_ptr<const Eigen::MatrixXd> rig_prior = {});
 
 // Global bundle adjustment of all keyframes except the roots, and all landmarks.
 adjustment::AdjustmentReport adjust_globally(const MappingOptions& options, const FeatureModel& features,

@@ -140,11 +140,11 @@ TEST(Pinhole, ProjectsNothingOnOrBehindItsPlane) {
 TEST(PinholeRadTan, DomainEndsAtTheMaximumDistortedRadius) {
   const PinholeRadTan camera({458.654, 457.296, 367.215, 248.375}, {-0.28340811, 0.07395907, 0, 0});
   // r (1 + k1 r^2 + k2 r^4): 1 + 3 k1 r^2 + 5 k2 r^4 has no root here, so the radius increases without limit.
-  EXPECT_TRUE(std::isinf(camera.max_radius()));
+  EXPECT_TRUE(camera.project({1000, 0, 1}));
   const PinholeRadTan barrel({458, 457, 367, 248}, {-0.28, 0, 0, 0});
-  EXPECT_NEAR(barrel.max_radius(), std::sqrt(1 / (3 * 0.28)), 0.003);
-  EXPECT_TRUE(barrel.project({1.0, 0, 1}));
-  EXPECT_FALSE(barrel.project({1.2, 0, 1}));
+  const double end = std::sqrt(1 / (3 * 0.28));  // of the radii: 1 + 3 k1 r^2 = 0
+  EXPECT_TRUE(barrel.project({end - 0.003, 0, 1}));
+  EXPECT_FALSE(barrel.project({end + 0.003, 0, 1}));
   EXPECT_FALSE(barrel.project_with_jacobian({1.2, 0, 1}));
   EXPECT_FALSE(barrel.unproject({367 + 458 * 0.8, 248}));  // beyond the largest distorted radius, 0.727
 }
@@ -158,8 +158,7 @@ TEST(PinholeRadTan, KeepsItsCoefficients) {
 
 TEST(KannalaBrandt, ProjectsPointsBehindItsPlane) {
   const KannalaBrandt camera({130, 130, 320, 240}, {0, 0, 0, 0});
-  EXPECT_EQ(camera.max_theta(), kPi);
-  for (const double theta : {0.5 * kPi, 0.6 * kPi, 0.9 * kPi}) {
+  for (const double theta : {0.5 * kPi, 0.6 * kPi, 0.9 * kPi, 0.999 * kPi}) {
     const Vector3d direction(std::sin(theta), 0, std::cos(theta));
     EXPECT_LT((camera.project(direction).value() - Vector2d(320 + 130 * theta, 240)).norm(), 1e-9);
     EXPECT_LT((camera.unproject({320 + 130 * theta, 240}).value() - direction).norm(), 1e-9);
@@ -169,10 +168,9 @@ TEST(KannalaBrandt, ProjectsPointsBehindItsPlane) {
 TEST(KannalaBrandt, DomainEndsAtTheMaximumRadius) {
   const KannalaBrandt camera({130, 130, 320, 240}, {-0.1, 0, 0, 0});  // 1 - 0.3 theta^2 = 0
   const double end = std::sqrt(1 / 0.3);
-  EXPECT_NEAR(camera.max_theta(), end, 0.0011);
   const auto at = [](double theta) { return Vector3d(std::sin(theta), 0, std::cos(theta)); };
-  EXPECT_TRUE(camera.project(at(end - 0.01)));
-  EXPECT_FALSE(camera.project(at(end + 0.01)));
+  EXPECT_TRUE(camera.project(at(end - 0.002)));
+  EXPECT_FALSE(camera.project(at(end + 0.002)));
   EXPECT_FALSE(camera.project_with_jacobian(at(end + 0.01)));
   EXPECT_FALSE(camera.unproject({320 + 130 * (end - 0.1 * std::pow(end, 3)) + 1, 240}));
 }

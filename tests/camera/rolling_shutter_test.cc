@@ -18,17 +18,20 @@ Camera rolling_camera(double readout_s) {
   return camera;
 }
 
+// Exposure of a row of that camera with a readout of 20 ms, minus the exposure of the middle row, in seconds.
+double row_delay_s(double y) { return 0.02 * (y / 479 - 0.5); }
+
 const Vector6d kTwist = (Vector6d() << 0.5, -0.9, 0.3, 0.8, -0.4, 1.1).finished();
 const SE3 kCamRig = SE3::exp((Vector6d() << 0.2, 0.5, -0.3, 0.1, -0.2, 0.05).finished());
 
 TEST(Shutter, MiddleRowsAreExposedAtTheTimeOfTheImage) {
   const Camera camera = rolling_camera(0.02);
-  EXPECT_DOUBLE_EQ(camera.row_delay_s(239.5), 0.0);
-  EXPECT_DOUBLE_EQ(camera.row_delay_s(0), -0.01);
-  EXPECT_DOUBLE_EQ(camera.row_delay_s(479), 0.01);
   const Shutter shutter(camera, kCamRig, kTwist);
   EXPECT_TRUE(shutter.rolling());
-  for (const double y : {0.0, 100.0, 479.0}) EXPECT_NEAR(shutter.delay_s(y), camera.row_delay_s(y), 1e-15);
+  EXPECT_NEAR(shutter.delay_s(239.5), 0.0, 1e-15);
+  EXPECT_NEAR(shutter.delay_s(0), -0.01, 1e-15);
+  EXPECT_NEAR(shutter.delay_s(479), 0.01, 1e-15);
+  for (const double y : {0.0, 100.0, 479.0}) EXPECT_NEAR(shutter.delay_s(y), row_delay_s(y), 1e-15);
 }
 
 TEST(Shutter, MovesPointsLikeTheRig) {
@@ -36,7 +39,7 @@ TEST(Shutter, MovesPointsLikeTheRig) {
   const Shutter shutter(camera, kCamRig, kTwist);
   const Vector3d point_rig(0.4, -0.3, 3.0);
   for (const double y : {0.0, 77.5, 479.0}) {
-    const Vector3d exact = kCamRig * (SE3::exp(camera.row_delay_s(y) * kTwist) * point_rig);
+    const Vector3d exact = kCamRig * (SE3::exp(row_delay_s(y) * kTwist) * point_rig);
     EXPECT_LT((shutter.at_row(kCamRig * point_rig, y) - exact).norm(), 2e-6);
     EXPECT_LT((shutter.pose_at_row(kCamRig, y) * point_rig - exact).norm(), 1e-12);
   }
