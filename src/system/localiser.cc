@@ -99,8 +99,7 @@ Localiser::Localiser(camera::Rig rig, const Config& config, map::BundledMap map,
       map_(std::make_shared<const map::BundledMap>(std::move(map))),
       rig_(map::with_cameras(map_->given_rig(), cameras_.first, run_rig_)),
       masks_(widened(std::move(masks), cameras_, rig_.size())),
-      places_(std::make_shared<SharedPlaces>(std::move(vocabulary), config_.looping.recognition)),
-      keyframe_maker_(rig_, config_, nullptr, {}) {
+      places_(std::make_shared<SharedPlaces>(std::move(vocabulary), config_.looping.recognition)) {
   places_->query_frame(*map_, frame::BundledFrame());  // computes the index
 }
 
@@ -108,7 +107,7 @@ Result<tracking::FrameRecord> Localiser::localise(const image::ImageBundle& imag
   if (const Status valid = check_frame(images, run_rig_, std::nullopt); !valid) return valid.error();
   FixedMap map(map_);
   auto relocaliser = std::make_unique<PlaceRelocaliser>(std::make_unique<PlacesOfThread>(places_), config_);
-  Pipeline pipeline(rig_, cameras_, config_, masks_, std::move(relocaliser), keyframe_maker_);
+  Pipeline pipeline(rig_, cameras_, config_, masks_, std::move(relocaliser), nullptr);
   Pipeline::Outcome outcome = pipeline.process(widened(images, cameras_, rig_.size()), map);
   narrow(outcome.record, cameras_);
   tracking::TrackResult& result = outcome.record.result;

@@ -11,7 +11,6 @@
 #include "image/image_bundle.h"
 #include "looping/place_recogniser.h"
 #include "system/config.h"
-#include "system/keyframe_maker.h"
 #include "tracking/frame_record.h"
 
 namespace bslam::system {
@@ -46,7 +45,6 @@ class Localiser {
   const camera::Rig rig_;                  // rig of the map, with the given calibration
   const std::vector<image::Image> masks_;  // per camera of the map
   const std::shared_ptr<looping::PlaceRecogniser> places_;
-  mutable KeyframeMaker keyframe_maker_;  // unused: no keyframes are created
 };
 
 }  // namespace bslam::system

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "base/assert.h"
 #include "base/stopwatch.h"
 
 namespace bslam::system {
@@ -39,7 +40,7 @@ std::vector<tracking::CameraEvidence> evidence(const image::ImageBundle& images,
 }  // namespace
 
 Pipeline::Pipeline(const camera::Rig& rig, CamerasOfRun cameras, const Config& config, std::vector<image::Image> masks,
-                   std::unique_ptr<tracking::Relocaliser> relocaliser, KeyframeMaker& keyframe_maker)
+                   std::unique_ptr<tracking::Relocaliser> relocaliser, KeyframeMaker* keyframe_maker)
     : given_(rig),
       rig_(std::make_shared<const camera::Rig>(rig)),
       config_(config),
@@ -148,16 +149,17 @@ tracking::TrackOutcome Pipeline::track_with_corrected_rig(const image::ImageBund
 // Passes a frame that was tracked directly and its images to the keyframe maker, which creates a keyframe from it.
 FrameId Pipeline::defer_keyframe(const tracking::FramePlan& plan, BundledFrame frame,
                                  const tracking::TrackOutcome& found) {
+  BSLAM_ASSERT(keyframe_maker_ != nullptr, "no keyframes are created while localising");
   const FrameId id = frame.id;
   tracking::KeyframeRequest request{std::move(frame), std::move(state_), found.record.result.anchored};
-  keyframe_maker_.request({std::move(request), builder_.release(), plan.budgets, plan.alignment, rig_});
+  keyframe_maker_->request({std::move(request), builder_.release(), plan.budgets, plan.alignment, rig_});
   return id;
 }
 
 std::optional<tracking::CreatedKeyframe> Pipeline::adopt_keyframe(Outcome& outcome) {
   const auto created = tracker_.adopt_keyframe(*outcome.seen, state_);
   if (!created) return std::nullopt;
-  FeatureEvidence evidence = keyframe_maker_.take_evidence(created->frame);
+  FeatureEvidence evidence = keyframe_maker_->take_evidence(created->frame);
   state_.budget_fractions = std::move(evidence.budget_fractions);
   outcome.created_cameras = std::move(evidence.cameras);
   return created;

@@ -21,9 +21,10 @@ using tracking::StageTime;
 class Pipeline {
  public:
   // `rig`, `config` and `keyframe_maker` must outlive the pipeline. Without a relocaliser a lost rig is only searched
-  // for near its last pose. `cameras`: the cameras of the rig that are used in this run.
+  // for near its last pose. `cameras`: the cameras of the rig that are used in this run. `keyframe_maker`: may be null
+  // if the map is not changed (Config::localize_only).
   Pipeline(const camera::Rig& rig, CamerasOfRun cameras, const Config& config, std::vector<image::Image> masks,
-           std::unique_ptr<tracking::Relocaliser> relocaliser, KeyframeMaker& keyframe_maker);
+           std::unique_ptr<tracking::Relocaliser> relocaliser, KeyframeMaker* keyframe_maker);
 
   struct Outcome {
     FrameRecord record;
@@ -80,7 +81,7 @@ class Pipeline {
   matching::FrameBuilder builder_;
   tracking::Tracker tracker_;
   tracking::FrontEndState state_;
-  KeyframeMaker& keyframe_maker_;
+  KeyframeMaker* const keyframe_maker_;  // may be null
 };
 
 }  // namespace bslam::system

@@ -30,17 +30,17 @@ execution::StageResult close_loop(looping::LoopCloser& closer, const LoopObserve
 
 // The parameter of map_keyframe. A map that was loaded has been compared with its calibration.
 std::shared_ptr<const Eigen::MatrixXd> rig_prior(const calibration::CalibrationOptions& options,
-                                                 const camera::Rig& calibrated, KeyframeId first) {
-  if (options.refine == calibration::Refine::kFalse || calibrated.size() < 2 || first.index() > 0) return nullptr;
-  return std::make_shared<const Eigen::MatrixXd>(calibration::prior_information(calibrated, options));
+                                                 const camera::Rig& given_rig, KeyframeId first) {
+  if (options.refine == calibration::Refine::kFalse || given_rig.size() < 2 || first.index() > 0) return nullptr;
+  return std::make_shared<const Eigen::MatrixXd>(calibration::prior_information(given_rig, options));
 }
 
 // Returns true if a calibration that is due can be skipped. Images that contradict the calibration already do so in the
 // first estimates. If the first ones agree with it, every fourth one of the following is sufficient. A map that was
 // loaded, or whose scale had to be estimated, may have had no estimate yet.
-bool left_out(const calibration::CalibrationOptions& options, const map::BundledMap& map, const camera::Rig& calibrated,
+bool left_out(const calibration::CalibrationOptions& options, const map::BundledMap& map, const camera::Rig& given_rig,
               KeyframeId first, KeyframeId keyframe) {
-  if (options.refine == calibration::Refine::kTrue || calibration::replaced(map.rig(), calibrated)) return false;
+  if (options.refine == calibration::Refine::kTrue || calibration::replaced(map.rig(), given_rig)) return false;
   if (first.index() > 0 || map.scale_deviation() > 0) return false;
   const int number = execution::calibration_due(keyframe).value_or(0);
   return number >= 2 && number % 4 != 1;
@@ -48,12 +48,11 @@ bool left_out(const calibration::CalibrationOptions& options, const map::Bundled
 
 // Replaces the rig by its estimate from the map so far, and adjusts the map with it. The newest keyframe keeps its
 // pose, so that the current pose of the rig does not jump, unless it is in a loaded submap.
-execution::StageResult calibrate(const Config& config, const camera::Rig& calibrated, KeyframeId first,
+execution::StageResult calibrate(const Config& config, const camera::Rig& given_rig, KeyframeId first,
                                  const execution::StageTask& task, const map::MapSnapshot& base,
                                  const std::stop_token& stop) {
-  if (left_out(config.calibration, *base, calibrated, first, task.keyframe)) return {};
-  auto refinement =
-      calibration::refine_if_accepted(*base, calibrated, config.calibration, config.feature_model(), stop);
+  if (left_out(config.calibration, *base, given_rig, first, task.keyframe)) return {};
+  auto refinement = calibration::refine_if_accepted(*base, given_rig, config.calibration, config.feature_model(), stop);
   if (!refinement) return {};
   calibration::keep_scale(config.calibration, *refinement);
   map::MapDraft draft(base);
@@ -80,15 +79,15 @@ std::shared_ptr<looping::LoopCloser> make_loop_closer(const Config& config, cons
                                                static_cast<std::uint64_t>(config.seed));
 }
 
-execution::StageFunctions make_stages(const Config& config, KeyframeMaker& keyframe_maker,
-                                      const camera::Rig& calibrated, KeyframeId first,
-                                      std::shared_ptr<looping::LoopCloser> closer, LoopObserver observer) {
+execution::StageFunctions make_stages(const Config& config, KeyframeMaker& keyframe_maker, const camera::Rig& given_rig,
+                                      KeyframeId first, std::shared_ptr<looping::LoopCloser> closer,
+                                      LoopObserver observer) {
   execution::StageFunctions functions;
   functions[execution::Stage::kKeyframe] = [&keyframe_maker](const execution::StageTask& task,
                                                              const map::MapSnapshot& base, std::stop_token) {
     return keyframe_maker.make(task.frame, base);
   };
-  functions[execution::Stage::kMap] = [&config, prior = rig_prior(config.calibration, calibrated, first)](
+  functions[execution::Stage::kMap] = [&config, prior = rig_prior(config.calibration, given_rig, first)](
                                           const execution::StageTask& task, const map::MapSnapshot& base,
                                           std::stop_token stop) {
     return map_keyframe(config, prior, task, base, std::move(stop));
@@ -98,10 +97,10 @@ execution::StageFunctions make_stages(const Config& config, KeyframeMaker& keyfr
     return adjust_globally(config, base, std::move(stop));
   };
   if (config.calibration.refine != calibration::Refine::kFalse) {
-    functions[execution::Stage::kCalibrate] = [&config, &calibrated, first](const execution::StageTask& task,
-                                                                            const map::MapSnapshot& base,
-                                                                            const std::stop_token& stop) {
-      return calibrate(config, calibrated, first, task, base, stop);
+    functions[execution::Stage::kCalibrate] = [&config, &given_rig, first](const execution::StageTask& task,
+                                                                           const map::MapSnapshot& base,
+                                                                           const std::stop_token& stop) {
+      return calibrate(config, given_rig, first, task, base, stop);
     };
   }
   if (!closer) return functions;

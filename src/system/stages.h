@@ -24,11 +24,10 @@ using LoopObserver = std::function<void(const LoopRecord&)>;
 // Returns null if no loops are closed: without a vocabulary, or if the settings say so.
 std::shared_ptr<looping::LoopCloser> make_loop_closer(const Config& config, const place::VocabularyPtr& vocabulary);
 
-// `config`, `keyframe_maker` and `calibrated`, the given calibration, must outlive the functions. Keyframes before
-// `first` belong to a loaded map, whose world frame stays when the rig is calibrated. Without a `closer` no loops are
-// closed.
-execution::StageFunctions make_stages(const Config& config, KeyframeMaker& keyframe_maker,
-                                      const camera::Rig& calibrated, KeyframeId first,
-                                      std::shared_ptr<looping::LoopCloser> closer, LoopObserver observer);
+// `config`, `keyframe_maker` and `given_rig` must outlive the functions. Keyframes before `first` belong to a loaded
+// map, whose world frame stays when the rig is calibrated. Without a `closer` no loops are closed.
+execution::StageFunctions make_stages(const Config& config, KeyframeMaker& keyframe_maker, const camera::Rig& given_rig,
+                                      KeyframeId first, std::shared_ptr<looping::LoopCloser> closer,
+                                      LoopObserver observer);
 
 }  // namespace bslam::system
