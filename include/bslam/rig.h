@@ -67,8 +67,9 @@ class BSLAM_EXPORT Rig {
   // Returns a copy of the calibration of camera i; an empty calibration if i >= size().
   CameraCalibration camera(std::size_t i) const;
 
-  // How ambiguous content of the file was interpreted, and likely mistakes in units, frames or axes; one line each.
+  // How ambiguous content of the file was interpreted; one line each.
   std::vector<std::string> notes() const;
+  // Likely mistakes in units, frames or axes; one line each.
   std::vector<std::string> warnings() const;
 
  private:

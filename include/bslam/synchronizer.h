@@ -49,8 +49,9 @@ struct SyncOptions {
   // Maximum number of waiting images per camera; if it is exceeded, the oldest bundle is completed without its missing
   // images.
   std::size_t max_images = 32;
-  // Maximum number of bundles that wait to be fetched; if it is exceeded, the oldest one is dropped. Images pushed
-  // before another thread fetches bundles are therefore lost, although push() succeeds: see on_drop and counts().
+  // Maximum number of bundles that wait to be fetched; if it is exceeded, the oldest one is dropped. If more than
+  // that are completed before another thread fetches any, the oldest are lost although push() succeeded: see on_drop
+  // and counts().
   std::size_t max_bundles = 4;
   // Called by the thread that calls push() or close(); optional. An exception that it throws is returned by the call as
   // an error, after all other images were reported.

@@ -16,7 +16,8 @@ namespace bslam::api {
 Pose to_pose(const geometry::SE3& T);
 geometry::SE3 to_se3(const Pose& pose);
 
-// `covariance` is the covariance of a left perturbation of T_rig_world, rotation first.
+// Copies the matrix: the covariance of a left perturbation of T_rig_world, rotation first, is that of a right
+// perturbation of T_world_rig.
 Covariance6 to_covariance(const geometry::Matrix6d& covariance);
 
 // Returns the velocity of a frame fixed to the rig, in the axes of that frame, if the rig moves with `twist`:

@@ -25,9 +25,10 @@ class AtomicFolder {
   Status write(const std::filesystem::path& name, std::string_view bytes) const;
 
   // Moves the folder to its place by one rename. If the destination is a folder with files, the new files are moved
-  // into it one by one and its other files remain. After an error, all files of the folder are as before. Only if the
-  // program is killed during the move can some files be new and the replaced ones be in `PLACE.part-*` next to the
-  // folder.
+  // into it one by one and its other files remain. After an error, all files of the folder are as before, unless
+  // a file cannot be moved back: then some files are new, and the error names the folder with the replaced ones. If the
+  // program is killed during the move, some files can be new as well and the replaced ones be in `PLACE.part-*` next to
+  // the folder.
   Status commit();
 
  private:

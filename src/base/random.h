@@ -1,4 +1,5 @@
-// Seeded pseudo-random numbers that are identical on every platform (xoshiro256**, seeded by splitmix64).
+// Seeded pseudo-random numbers (xoshiro256**, seeded by splitmix64). Those of next(), below() and uniform() are
+// identical on every platform; the last bits of those of normal() depend on the mathematical library.
 #pragma once
 
 #include <cstdint>
