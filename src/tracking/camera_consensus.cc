@@ -10,9 +10,23 @@ using geometry::SE3;
 
 namespace {
 
+constexpr double kClearlyLess = 0.5;  // fraction of the largest inlier ratio
+
 bool conflict(const LandmarkCounts& agreeing, const ConsensusOptions& options) {
   return agreeing.expected >= options.min_expected &&
          agreeing.found < options.conflict_inlier_ratio * agreeing.expected;
+}
+
+// Returns true if no camera with enough matches has a clearly lower inlier ratio than another one.
+bool agreed_by_all(const std::vector<int>& inliers, const FrameMatches& matches, const ConsensusOptions& options) {
+  double lowest = 1.0, highest = 0.0;
+  for (std::size_t c = 0; c < matches.size(); ++c) {
+    if (static_cast<int>(matches[c].size()) < options.min_expected) continue;
+    const double ratio = static_cast<double>(inliers[c]) / static_cast<double>(matches[c].size());
+    lowest = std::min(lowest, ratio);
+    highest = std::max(highest, ratio);
+  }
+  return lowest >= kClearlyLess * highest;
 }
 
 }  // namespace
@@ -96,7 +110,6 @@ std::vector<std::uint8_t> conflicting_cameras(const std::vector<LandmarkCounts>&
 std::vector<std::uint8_t> contradicting_cameras(const std::vector<LandmarkCounts>& agreeing,
                                                 const std::vector<CameraConsensusState>& states,
                                                 const ConsensusOptions& options) {
-  constexpr double kClearlyLess = 0.5;  // fraction of the largest inlier ratio
   std::vector<std::uint8_t> out = conflicting_cameras(agreeing, states, options);
   double best = 0;
   for (const LandmarkCounts& camera : agreeing) {
@@ -115,21 +128,23 @@ solver::PoseSolution pose_of_most_consistent_camera(const camera::Rig& rig, cons
                                                     const solver::PoseSolverOptions& pose) {
   constexpr double kRadiansPerMetre = 1.0;  // weight of a translation relative to a rotation
   constexpr double kMaxChi2 = 25.0;         // squared normalised error of observations that agree with such a pose
+  const auto healthy = [&](int inliers, std::size_t found) {
+    return inliers >= options.healthy_reobservation_ratio * static_cast<double>(found);
+  };
   solver::PoseSolution best;
   double min_distance = std::numeric_limits<double>::infinity();
+  bool contradiction = true;  // no pose agrees with all cameras
   const auto consider = [&](const SE3& T_rig_world) {
     const geometry::Vector6d difference = (T_rig_world * predicted.inverse()).log();
     const double distance = difference.head<3>().norm() + kRadiansPerMetre * difference.tail<3>().norm();
-    if (distance >= min_distance) return;
     solver::PoseSolverOptions near = pose;
     near.first_chi2 = kMaxChi2;
     solver::PoseSolution joint = solver::solve_pose(rig, observations, T_rig_world, near);
     if (!joint.ok) return;
+    contradiction = contradiction && !agreed_by_all(joint.inliers_per_camera, matches, options);
+    if (distance >= min_distance) return;
     min_distance = distance;
     best = std::move(joint);
-  };
-  const auto healthy = [&](int inliers, std::size_t found) {
-    return inliers >= options.healthy_reobservation_ratio * static_cast<double>(found);
   };
   std::size_t first = 0;
   bool any_healthy = false;
@@ -141,6 +156,7 @@ solver::PoseSolution pose_of_most_consistent_camera(const camera::Rig& rig, cons
     if (single.ok && healthy(single.num_inliers, own.size())) consider(single.T_rig_world);
     any_healthy = any_healthy || (of_all.ok && healthy(of_all.inliers_per_camera[c], own.size()));
   }
+  if (!contradiction) return {};
   if (any_healthy) consider(of_all.T_rig_world);
   return best;
 }

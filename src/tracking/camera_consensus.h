@@ -64,7 +64,9 @@ std::vector<std::uint8_t> contradicting_cameras(const std::vector<LandmarkCounts
 // The pose if cameras contradict each other. A pose is estimated from each camera with enough matches, and used if it
 // has enough inliers (`healthy_reobservation_ratio`), as is `of_all`, the pose from all cameras, if it has enough in
 // one of them. The one nearest to the prediction of the motion model is refined with all observations that agree with
-// it. Returns a solution that is not ok if there is none. `observations`: those of `matches`, in the same order.
+// it. Returns a solution that is not ok if there is none, or if the cameras do not contradict each other: one of these
+// poses agrees with all of them about equally, so that several things move and all cameras see the same.
+// `observations`: those of `matches`, in the same order.
 solver::PoseSolution pose_of_most_consistent_camera(const camera::Rig& rig, const FrameMatches& matches,
                                                     std::span<const solver::PoseObservation> observations,
                                                     const solver::PoseSolution& of_all, const geometry::SE3& predicted,

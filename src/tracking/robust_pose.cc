@@ -6,6 +6,7 @@
 #include <limits>
 #include <optional>
 
+#include "base/median.h"
 #include "estimators/pose_ransac.h"
 #include "tracking/image_cells.h"
 #include "tracking/scene_agreement.h"
@@ -25,6 +26,12 @@ constexpr double kMoreSupport = 1.1;
 // may be wrong.
 constexpr double kComparable = 0.75;
 
+// A moving object is small compared with the static scene around it, however many landmarks it has. Supports are
+// multiplied by the ratio of the extents of two motions, up to kMaxWider, if it is at least kWider.
+constexpr double kWider = 1.5, kMaxWider = 3.0;
+constexpr std::size_t kMinOfMotion = 20;         // minimum number of landmarks that agree with one of two motions only
+constexpr double kFractionOfOutliers = 1.0 / 3;  // minimum fraction of the outliers of one motion that is another one
+
 constexpr double kNew = 0.5;           // support of a new landmark
 constexpr double kTrustedAfter = 1.0;  // s, of observation by keyframes
 
@@ -43,6 +50,18 @@ double time_observed(const map::BundledMap& map, LandmarkId landmark) {
   return first >= last ? 0.0 : std::min(kTrustedAfter, to_seconds(last - first));
 }
 
+// The median distance of points from their median position.
+double extent(const std::vector<Eigen::Vector3d>& points) {
+  Eigen::Vector3d middle;
+  std::vector<double> values(points.size());
+  for (int axis = 0; axis < 3; ++axis) {
+    std::ranges::transform(points, values.begin(), [&](const Eigen::Vector3d& p) { return p[axis]; });
+    middle[axis] = median(values);
+  }
+  std::ranges::transform(points, values.begin(), [&](const Eigen::Vector3d& p) { return (p - middle).norm(); });
+  return median(values);
+}
+
 // The poses of a frame from which one is chosen.
 class PoseChoice {
  public:
@@ -57,8 +76,9 @@ class PoseChoice {
   void consider(solver::PoseSolution other) {
     if (!other.ok) return;
     const Support of_other = support_of(other);
-    if (best_.ok && of_other.landmarks < kComparable * support_.landmarks) return;
-    if (best_.ok && of_other.sum() <= kMoreSupport * support_.sum()) return;
+    const double factor = best_.ok ? relative_extent(other) : 1.0;
+    if (best_.ok && factor * of_other.landmarks < kComparable * support_.landmarks) return;
+    if (best_.ok && factor * of_other.sum() <= kMoreSupport * support_.sum()) return;
     best_ = std::move(other);
     support_ = of_other;
   }
@@ -74,6 +94,28 @@ class PoseChoice {
   Support support_of(const solver::PoseSolution& solution) const {
     return {support(map_, matches_, observations_, solution.inlier),
             scene_ ? kNew * scene_->agreeing_cells(solution.T_rig_world) : 0.0};
+  }
+
+  // The factor by which the support of another pose counts more or less than that of the best one: the ratio of the
+  // extents in space of the landmarks that agree with only one of the two. Landmarks that agree with both are far away.
+  double relative_extent(const solver::PoseSolution& other) const {
+    const std::vector<Eigen::Vector3d> of_other = exclusive(other, best_), of_best = exclusive(best_, other);
+    if (std::min(of_other.size(), of_best.size()) < kMinOfMotion) return 1.0;
+    const double ratio = extent(of_other) / extent(of_best);
+    if (ratio < kWider && ratio > 1.0 / kWider) return 1.0;
+    // Outliers that are no motion agree with another pose by chance, and are spread widely.
+    const auto outliers = static_cast<double>(std::ranges::count(best_.inlier, std::uint8_t{0}));
+    if (ratio > 1.0 && static_cast<double>(of_other.size()) < kFractionOfOutliers * outliers) return 1.0;
+    return std::clamp(ratio, 1.0 / kMaxWider, kMaxWider);
+  }
+
+  // Positions of the landmarks that agree with a pose but not with another.
+  std::vector<Eigen::Vector3d> exclusive(const solver::PoseSolution& with, const solver::PoseSolution& without) const {
+    std::vector<Eigen::Vector3d> out;
+    for (std::size_t i = 0; i < observations_.size(); ++i) {
+      if (with.inlier[i] && !without.inlier[i]) out.push_back(observations_[i].point_world);
+    }
+    return out;
   }
 
   const map::BundledMap& map_;
