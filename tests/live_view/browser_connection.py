@@ -7,6 +7,8 @@ import socket
 import struct
 import subprocess
 
+SLOWNESS = float(os.environ.get('BSLAM_SLOWNESS', 1))  # of a program built with a sanitizer
+
 
 class View:
     """A run of bslam with a live view."""
@@ -25,7 +27,7 @@ class View:
         return self.raw(head.encode())
 
     def raw(self, data):
-        with socket.create_connection(('127.0.0.1', self.port), timeout=20) as s:
+        with socket.create_connection(('127.0.0.1', self.port), timeout=20 * SLOWNESS) as s:
             s.sendall(data)
             answer = b''
             while part := s.recv(1 << 16):
@@ -38,7 +40,7 @@ class Browser:
     """A WebSocket connection to a view."""
 
     def __init__(self, view, token=None, origin=None, host=None):
-        self.socket = socket.create_connection(('127.0.0.1', view.port), timeout=20)
+        self.socket = socket.create_connection(('127.0.0.1', view.port), timeout=20 * SLOWNESS)
         host = host or f'127.0.0.1:{view.port}'
         origin = f'Origin: {origin}\r\n' if origin else ''
         key = base64.b64encode(os.urandom(16)).decode()

@@ -15,7 +15,7 @@ import tempfile
 import time
 import unittest
 
-from browser_connection import Browser, View
+from browser_connection import SLOWNESS, Browser, View
 
 BSLAM = pathlib.Path(sys.argv.pop(1)).resolve()
 FRAMES = 20
@@ -64,7 +64,7 @@ class LiveView(unittest.TestCase):
                 browser.next('state')
         except ConnectionError as closed:
             self.assertEqual(str(closed), 'ended')
-        self.assertEqual(view.process.wait(timeout=60), 0)
+        self.assertEqual(view.process.wait(timeout=60 * SLOWNESS), 0)
 
     def test_only_requests_with_the_token_from_this_machine_are_answered(self):
         view = self.view()
@@ -136,7 +136,7 @@ class LiveView(unittest.TestCase):
         self.assertEqual(runs[-1]['summary']['frames']['tracked'], FRAMES)
         self.assertTrue(runs[-1]['summary']['complete'])
         self.assertIn('ate_m', runs[-1]['truth'])
-        self.assertEqual(view.process.wait(timeout=60), 0)
+        self.assertEqual(view.process.wait(timeout=60 * SLOWNESS), 0)
 
     def test_a_browser_that_confirms_nothing_gets_one_update_and_holds_nobody_up(self):
         view = self.view()
@@ -167,7 +167,7 @@ class LiveView(unittest.TestCase):
                     if isinstance(other.read(), str):
                         raise ConnectionError
             other.close()
-        idle = [socket.create_connection(('127.0.0.1', view.port), timeout=20) for _ in range(40)]  # more than are kept
+        idle = [socket.create_connection(('127.0.0.1', view.port), timeout=20 * SLOWNESS) for _ in range(40)]  # more than are kept
         browser.send('step')
         browser.next('frame')
         for s in idle:
@@ -178,7 +178,7 @@ class LiveView(unittest.TestCase):
         view = self.view()
         self.paused(view)
         view.process.send_signal(signal.SIGINT)
-        self.assertEqual(view.process.wait(timeout=60), 130)
+        self.assertEqual(view.process.wait(timeout=60 * SLOWNESS), 130)
         self.assertIn('"complete": false', (self.out / 'summary.json').read_text())
 
     def test_a_port_in_use_and_wrong_ones_are_refused_in_one_line(self):

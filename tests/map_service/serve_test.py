@@ -6,6 +6,7 @@
 import http.client
 import json
 import math
+import os
 import pathlib
 import random
 import re
@@ -20,6 +21,7 @@ import unittest
 BSLAM = pathlib.Path(sys.argv.pop(1)).resolve()
 CAMERAS = ['front_left', 'front_right', 'left', 'right']
 BOUNDARY = 'boundary0123456789'
+SLOWNESS = float(os.environ.get('BSLAM_SLOWNESS', 1))  # of a program built with a sanitizer
 
 
 def form(images):
@@ -42,7 +44,7 @@ class Server:
 
     def ask(self, method, path, body=b'', headers=None, kind=f'multipart/form-data; boundary={BOUNDARY}'):
         """Status, headers and body of the answer."""
-        connection = http.client.HTTPConnection('127.0.0.1', self.port, timeout=60)
+        connection = http.client.HTTPConnection('127.0.0.1', self.port, timeout=60 * SLOWNESS)
         try:
             connection.request(method, path, body, {'Content-Type': kind, **(headers or {})})
             answer = connection.getresponse()
@@ -55,7 +57,7 @@ class Server:
 
     def raw(self, data):
         """The status of the answer to bytes; None if the connection is closed without one."""
-        with socket.create_connection(('127.0.0.1', self.port), timeout=60) as s:
+        with socket.create_connection(('127.0.0.1', self.port), timeout=60 * SLOWNESS) as s:
             try:
                 s.sendall(data)
                 answer = s.makefile('rb').readline()
@@ -69,7 +71,7 @@ class Server:
 
     def end(self, number=signal.SIGINT):
         self.process.send_signal(number)
-        status = self.process.wait(timeout=60)
+        status = self.process.wait(timeout=60 * SLOWNESS)
         self.process.stdout.close()
         return status
 
@@ -291,7 +293,7 @@ class Serve(unittest.TestCase):
                      ([self.map, '--sett', 'x'], '--sett'), ([], 'map')]
             for options, expected in cases:
                 with self.subTest(expected=expected):
-                    ended = subprocess.run([BSLAM, 'serve', *options], capture_output=True, text=True, timeout=60)
+                    ended = subprocess.run([BSLAM, 'serve', *options], capture_output=True, text=True, timeout=60 * SLOWNESS)
                     self.assertEqual(ended.returncode, 2)
                     self.assertEqual(len(ended.stderr.splitlines()), 1, ended.stderr)
                     self.assertIn(expected, ended.stderr)
