@@ -28,8 +28,11 @@ constexpr double kComparable = 0.75;
 
 // A moving object is small compared with the static scene around it, however many landmarks it has. Supports are
 // multiplied by the ratio of the extents of two motions, up to kMaxWider, if it is at least kWider.
-constexpr double kWider = 1.5, kMaxWider = 3.0;
-constexpr std::size_t kMinOfMotion = 20;         // minimum number of landmarks that agree with one of two motions only
+constexpr double kWider = 2.0, kMaxWider = 3.0;
+// Minimum number of landmarks that agree with one of two motions only, and their minimum fraction of its inliers. With
+// fewer the two are variations of one motion.
+constexpr std::size_t kMinOfMotion = 20;
+constexpr double kFractionOfInliers = 1.0 / 3;
 constexpr double kFractionOfOutliers = 1.0 / 3;  // minimum fraction of the outliers of one motion that is another one
 
 constexpr double kNew = 0.5;           // support of a new landmark
@@ -76,9 +79,12 @@ class PoseChoice {
   void consider(solver::PoseSolution other) {
     if (!other.ok) return;
     const Support of_other = support_of(other);
-    const double factor = best_.ok ? relative_extent(other) : 1.0;
-    if (best_.ok && factor * of_other.landmarks < kComparable * support_.landmarks) return;
-    if (best_.ok && factor * of_other.sum() <= kMoreSupport * support_.sum()) return;
+    if (best_.ok) {
+      Support weighted = of_other;
+      weighted.scale(relative_extent(other));
+      if (weighted.landmarks.sum() < kComparable * support_.landmarks.sum()) return;
+      if (weighted.sum() <= kMoreSupport * support_.sum()) return;
+    }
     best_ = std::move(other);
     support_ = of_other;
   }
@@ -87,8 +93,14 @@ class PoseChoice {
 
  private:
   struct Support {
-    double landmarks = 0.0, scene = 0.0;
-    double sum() const { return landmarks + scene; }
+    LandmarkSupport landmarks;
+    double scene = 0.0;
+    double sum() const { return landmarks.sum() + scene; }
+    // Landmarks observed for a long time are evidence whatever their extent.
+    void scale(double factor) {
+      landmarks.spread *= factor;
+      scene *= factor;
+    }
   };
 
   Support support_of(const solver::PoseSolution& solution) const {
@@ -100,13 +112,18 @@ class PoseChoice {
   // extents in space of the landmarks that agree with only one of the two. Landmarks that agree with both are far away.
   double relative_extent(const solver::PoseSolution& other) const {
     const std::vector<Eigen::Vector3d> of_other = exclusive(other, best_), of_best = exclusive(best_, other);
-    if (std::min(of_other.size(), of_best.size()) < kMinOfMotion) return 1.0;
+    if (!is_motion(of_other.size(), other) || !is_motion(of_best.size(), best_)) return 1.0;
     const double ratio = extent(of_other) / extent(of_best);
     if (ratio < kWider && ratio > 1.0 / kWider) return 1.0;
     // Outliers that are no motion agree with another pose by chance, and are spread widely.
     const auto outliers = static_cast<double>(std::ranges::count(best_.inlier, std::uint8_t{0}));
     if (ratio > 1.0 && static_cast<double>(of_other.size()) < kFractionOfOutliers * outliers) return 1.0;
     return std::clamp(ratio, 1.0 / kMaxWider, kMaxWider);
+  }
+
+  // Whether this number of inliers that agree with no other pose shows that a pose is that of a motion of its own.
+  static bool is_motion(std::size_t exclusive, const solver::PoseSolution& solution) {
+    return exclusive >= kMinOfMotion && static_cast<double>(exclusive) >= kFractionOfInliers * solution.num_inliers;
   }
 
   // Positions of the landmarks that agree with a pose but not with another.
@@ -145,21 +162,27 @@ bool newly_started(const TrackInput& input, const frame::BundledFrame& frame) {
   return age_s >= 0.0 && age_s < kTrustedAfter;
 }
 
-double support(const map::BundledMap& map, const FrameMatches& matches,
-               std::span<const solver::PoseObservation> observations, std::span<const std::uint8_t> inlier) {
-  double sum = 0.0;
+LandmarkSupport support(const map::BundledMap& map, const FrameMatches& matches,
+                        std::span<const solver::PoseObservation> observations, std::span<const std::uint8_t> inlier) {
+  constexpr double kNone = -1.0;
+  LandmarkSupport out;
   std::size_t i = 0;
   for (std::size_t c = 0; c < matches.size(); ++c) {
-    std::array<double, kCells * kCells> cells{};
+    std::array<double, kCells * kCells> cells;  // longest time
+    cells.fill(kNone);
     for (const Match& m : matches[c]) {
       const std::size_t at = i++;
       if (!inlier[at]) continue;
       double& cell = cells[cell_of(observations[at].pixel, map.rig().camera(c))];
-      if (cell < kNew + kTrustedAfter) cell = std::max(cell, kNew + time_observed(map, m.landmark));
+      if (cell < kTrustedAfter) cell = std::max(cell, time_observed(map, m.landmark));
     }
-    for (const double cell : cells) sum += cell;
+    for (const double time : cells) {
+      if (time == kNone) continue;
+      out.spread += kNew;
+      out.lasting += time;
+    }
   }
-  return sum;
+  return out;
 }
 
 bool lasting_landmarks_found(const map::BundledMap& map, std::span<const LandmarkId> visible,

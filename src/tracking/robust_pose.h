@@ -9,12 +9,17 @@
 
 namespace bslam::tracking {
 
-// The support of a pose: how widely its inliers are spread over the images and over time. Each image has a grid of 8 x
-// 8 cells. A cell with inliers counts 1/2 + min(1, t), where t is the longest time in seconds between the first and the
-// last keyframe that observe the landmark of one of its inliers. A moving object covers few cells, however many of its
-// landmarks are found, and they soon become outliers. `observations` are those of `matches`, in order.
-double support(const map::BundledMap& map, const FrameMatches& matches,
-               std::span<const solver::PoseObservation> observations, std::span<const std::uint8_t> inlier);
+// The support of a pose by landmarks: how widely its inliers are spread over the images and over time. Each image has a
+// grid of 8 x 8 cells. A cell with inliers counts 1/2 (`spread`) + min(1, t) (`lasting`), where t is the longest time
+// in seconds between the first and the last keyframe that observe the landmark of one of its inliers. A moving object
+// covers few cells, however many of its landmarks are found, and they soon become outliers. `observations` are those of
+// `matches`, in order.
+struct LandmarkSupport {
+  double spread = 0.0, lasting = 0.0;
+  double sum() const { return spread + lasting; }
+};
+LandmarkSupport support(const map::BundledMap& map, const FrameMatches& matches,
+                        std::span<const solver::PoseObservation> observations, std::span<const std::uint8_t> inlier);
 
 // Returns true if landmarks that keyframes have observed for a long time are found about as often as those observed for
 // a short time. `visible`: all landmarks that were searched for. Landmarks on a moving object have only been observed

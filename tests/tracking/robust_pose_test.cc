@@ -135,7 +135,7 @@ TEST_F(RobustPose, OfSingleCamerasIsNotUsedIfAllCamerasSeeTheSameMotions) {
 
 TEST_F(RobustPose, SupportIsTheSpreadOverImagesAndTime) {
   std::vector<std::uint8_t> inlier(count(matches), 0);
-  EXPECT_EQ(support(world.map, matches, observations, inlier), 0);
+  EXPECT_EQ(support(world.map, matches, observations, inlier).sum(), 0);
   double sum = 0, most = 0;
   std::size_t i = 0;
   for (const Match& m : matches[0]) {
@@ -146,17 +146,17 @@ TEST_F(RobustPose, SupportIsTheSpreadOverImagesAndTime) {
       times.push_back(world.map.keyframe(o.keyframe).frame->time_ns);
     const auto [first, last] = std::ranges::minmax(times);
     const double expected = 0.5 + std::min(1.0, to_seconds(last - first));
-    EXPECT_DOUBLE_EQ(support(world.map, matches, observations, inlier), expected);
+    EXPECT_DOUBLE_EQ(support(world.map, matches, observations, inlier).sum(), expected);
     sum += expected;
     most = std::max(most, expected);
   }
   std::ranges::fill(inlier, std::uint8_t{0});
   std::fill_n(inlier.begin(), i, std::uint8_t{1});
-  const double spread = support(world.map, matches, observations, inlier);
+  const double spread = support(world.map, matches, observations, inlier).sum();
   EXPECT_GT(spread, 4 * most);
   EXPECT_LT(spread, sum);
   for (std::size_t k = 0; k < i; ++k) observations[k].pixel = observations[0].pixel;
-  EXPECT_DOUBLE_EQ(support(world.map, matches, observations, inlier), most);
+  EXPECT_DOUBLE_EQ(support(world.map, matches, observations, inlier).sum(), most);
 }
 
 // Landmarks on a small part of an image outnumber all others, and have been observed as long.
@@ -217,7 +217,8 @@ TEST_F(RobustPose, FollowsLandmarksThatSpreadInSpace) {
   }
   matches = of_both;
   observations = kept;
-  EXPECT_GT(support(world.map, matches, observations, near), 1.1 * support(world.map, matches, observations, far));
+  EXPECT_GT(support(world.map, matches, observations, near).sum(),
+            1.1 * support(world.map, matches, observations, far).sum());
   const geometry::SE3 predicted = truth.perturbed((geometry::Vector6d() << 0, 1e-3, 0, 0.002, 0, 0.001).finished());
   EXPECT_GT(error(solver::solve_pose(world.map.rig(), observations, predicted, motion, {})), 0.03);
   const auto solution = pose(predicted);
