@@ -114,7 +114,7 @@ class PoseChoice {
     const std::vector<Eigen::Vector3d> of_other = exclusive(other, best_), of_best = exclusive(best_, other);
     if (!is_motion(of_other.size(), other) || !is_motion(of_best.size(), best_)) return 1.0;
     const double ratio = extent(of_other) / extent(of_best);
-    if (ratio < kWider && ratio > 1.0 / kWider) return 1.0;
+    if (!(ratio >= kWider || ratio <= 1.0 / kWider)) return 1.0;  // also if both extents are zero
     // Outliers that are no motion agree with another pose by chance, and are spread widely.
     const auto outliers = static_cast<double>(std::ranges::count(best_.inlier, std::uint8_t{0}));
     if (ratio > 1.0 && static_cast<double>(of_other.size()) < kFractionOfOutliers * outliers) return 1.0;
