@@ -75,7 +75,8 @@ void furnish_square(Building& b, Random& random) {
   std::vector<Vector2d> taken;
   const auto free_place = [&](double radius) -> std::optional<Vector2d> {
     for (int attempt = 0; attempt < 60; ++attempt) {
-      const Vector2d p{random.uniform(-kHalfX + 1.2, kHalfX - 1.2), random.uniform(-kHalfY + 1.2, kHalfY - 1.2)};
+      const double y = random.uniform(-kHalfY + 1.2, kHalfY - 1.2), x = random.uniform(-kHalfX + 1.2, kHalfX - 1.2);
+      const Vector2d p(x, y);
       const bool in_block = std::abs(p.x()) < kBlockX + radius && std::abs(p.y()) < kBlockY + radius;
       const bool near_other = std::ranges::any_of(taken, [&](const Vector2d& t) { return (t - p).norm() < 2.2; });
       if (in_block || near_other || distance_to_tour(b, p) < radius + kFree) continue;

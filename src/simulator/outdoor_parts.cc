@@ -40,7 +40,8 @@ void add_panel(Building& b, const Facade& f, double at, double z, const Vector2d
 
 void decorate(Building& b, const Facade& f, Random& random) {
   const double storey = random.uniform(2.7, 3.3);
-  const Vector2d window{random.uniform(0.8, 1.2), random.uniform(1.2, 1.7)};
+  const double window_height = random.uniform(1.2, 1.7), window_width = random.uniform(0.8, 1.2);
+  const Vector2d window(window_width, window_height);
   const int columns = std::max(1, static_cast<int>(f.length / random.uniform(1.9, 2.6)));
   const double pitch = f.length / columns;
   const int door = static_cast<int>(random.below(static_cast<std::uint32_t>(columns)));
@@ -69,8 +70,8 @@ Material facade_material(Random& random) {
 void add_house(Building& b, const Vector2d& start, const Vector2d& along, double length, double depth, double height,
                Random& random) {
   const Vector2d centre = start + 0.5 * length * along - 0.5 * depth * left_of(along);
-  const Material material = facade_material(random);
-  const Texture wall = texture(material, static_cast<float>(random.uniform(0.35, 0.6)), random);
+  const double shade = random.uniform(0.35, 0.6);
+  const Texture wall = texture(facade_material(random), static_cast<float>(shade), random);
   add_box(b.surfaces, {at_height(centre, 0), {length, depth, height}, std::atan2(along.y(), along.x())}, wall,
           texture(Material::kTile, 0.4f, random));
   decorate(b, {start, along, length, height}, random);
