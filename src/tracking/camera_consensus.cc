@@ -17,16 +17,24 @@ bool conflict(const LandmarkCounts& agreeing, const ConsensusOptions& options) {
          agreeing.found < options.conflict_inlier_ratio * agreeing.expected;
 }
 
-// Returns true if no camera with enough matches has a clearly lower inlier ratio than another one.
-bool agreed_by_all(const std::vector<int>& inliers, const FrameMatches& matches, const ConsensusOptions& options) {
-  double lowest = 1.0, highest = 0.0;
-  for (std::size_t c = 0; c < matches.size(); ++c) {
-    if (static_cast<int>(matches[c].size()) < options.min_expected) continue;
-    const double ratio = static_cast<double>(inliers[c]) / static_cast<double>(matches[c].size());
-    lowest = std::min(lowest, ratio);
-    highest = std::max(highest, ratio);
+// The inlier ratio below which a camera agrees clearly less than the best one with enough matches.
+double clearly_lower_ratio(const std::vector<LandmarkCounts>& agreeing, const ConsensusOptions& options) {
+  double best = 0.0;
+  for (const LandmarkCounts& camera : agreeing) {
+    if (camera.expected >= options.min_expected) best = std::max(best, camera.ratio());
   }
-  return lowest >= kClearlyLess * highest;
+  return kClearlyLess * best;
+}
+
+// Returns true if no camera with enough matches agrees clearly less with a pose than the best one.
+bool agreed_by_all(const solver::PoseSolution& pose, const FrameMatches& matches, const ConsensusOptions& options) {
+  std::vector<LandmarkCounts> agreeing;
+  for (std::size_t c = 0; c < matches.size(); ++c)
+    agreeing.push_back({static_cast<int>(matches[c].size()), pose.inliers_per_camera[c]});
+  const double lower = clearly_lower_ratio(agreeing, options);
+  return std::ranges::all_of(agreeing, [&](const LandmarkCounts& camera) {
+    return camera.expected < options.min_expected || camera.ratio() >= lower;
+  });
 }
 
 }  // namespace
@@ -111,12 +119,9 @@ std::vector<std::uint8_t> contradicting_cameras(const std::vector<LandmarkCounts
                                                 const std::vector<CameraConsensusState>& states,
                                                 const ConsensusOptions& options) {
   std::vector<std::uint8_t> out = conflicting_cameras(agreeing, states, options);
-  double best = 0;
-  for (const LandmarkCounts& camera : agreeing) {
-    if (camera.expected >= options.min_expected) best = std::max(best, camera.ratio());
-  }
+  const double lower = clearly_lower_ratio(agreeing, options);
   for (std::size_t c = 0; c < out.size(); ++c) {
-    if (agreeing[c].ratio() >= kClearlyLess * best) out[c] = 0;
+    if (agreeing[c].ratio() >= lower) out[c] = 0;
   }
   return out;
 }
@@ -141,7 +146,7 @@ solver::PoseSolution pose_of_most_consistent_camera(const camera::Rig& rig, cons
     near.first_chi2 = kMaxChi2;
     solver::PoseSolution joint = solver::solve_pose(rig, observations, T_rig_world, near);
     if (!joint.ok) return;
-    contradiction = contradiction && !agreed_by_all(joint.inliers_per_camera, matches, options);
+    contradiction = contradiction && !agreed_by_all(joint, matches, options);
     if (distance >= min_distance) return;
     min_distance = distance;
     best = std::move(joint);

@@ -91,6 +91,8 @@ TEST(ObserveScale, ConvergesFromThreeTimesTooLargeOrTooSmall) {
     const SimulatedMap world = simulated_map(orbit(1), three_sides(), 8, factor, 1);
     map::MapDraft draft = world.draft();
     map_keyframe(KeyframeId(7), independent_noise(), kFeatures, draft);
+    map::MapDraft measured = draft;
+    EXPECT_TRUE(observe_scale(KeyframeId(7), independent_noise().scale, kFeatures, measured).observed);
     EXPECT_EQ(draft.map().scale(), map::Scale::kUnobservable);  // a single measurement is not enough
     EXPECT_NEAR(length_ratio(world, draft.map()), 1.0, 0.05) << factor;
     map_keyframe(KeyframeId(7), independent_noise(), kFeatures, draft);
