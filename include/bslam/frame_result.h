@@ -94,9 +94,12 @@ struct FrameResult {
   bool keyframe = false;
   int keyframe_id = -1;      // its id if it became a keyframe, otherwise the reference keyframe; -1 if none
   bool relocalised = false;  // tracking was recovered by place recognition
+  // Two motions explain the images almost equally well, such as those of the scene and of people who fill the view. The
+  // pose may be relative to the wrong one if this is true for several frames within a second.
+  bool contested = false;
   // The initial map was wrong: it was up to scale, and the rig was lost in it soon after, or the cameras that determine
-  // its scale contradicted it. All poses and keyframes reported so far are invalid, and the map is empty. A new one
-  // will be initialised; ids of keyframes are not used again.
+  // its scale contradicted it, or its poses were contested. All poses and keyframes reported so far are invalid, and
+  // the map is empty. A new one will be initialised; ids of keyframes are not used again.
   bool map_withdrawn = false;
 
   std::vector<StageTime> stages;

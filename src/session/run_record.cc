@@ -88,6 +88,24 @@ std::vector<ReducedInterval> reduced_intervals(const RunRecord& record) {
   return intervals;
 }
 
+std::vector<ContestedInterval> contested_intervals(const RunRecord& record) {
+  std::vector<double> times_s;
+  for (const RunFrame& frame : record.frames) {
+    if (frame.record && frame.record->final_result().contested) times_s.push_back(frame.time_s);
+  }
+  std::vector<ContestedInterval> intervals;
+  std::size_t next = 0;  // the first frame that belongs to no interval yet
+  for (std::size_t last = tracking::kContestedFrames - 1; last < times_s.size(); ++last) {
+    const std::size_t first = last + 1 - tracking::kContestedFrames;
+    if (times_s[last] - times_s[first] > tracking::kContestedWithin_s) continue;
+    if (intervals.empty() || next <= first) intervals.push_back({.from_s = times_s[first]});
+    intervals.back().frames += static_cast<std::int64_t>(last + 1 - std::max(next, first));
+    intervals.back().to_s = times_s[last];
+    next = last + 1;
+  }
+  return intervals;
+}
+
 bool never_started(const RunRecord& record) {
   const auto had_images = [](const RunFrame& frame) {
     return frame.record && frame.record->final_result().reason == tracking::LostReason::kNotStarted;

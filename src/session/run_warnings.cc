@@ -254,6 +254,20 @@ void warn_of_pairs(const RunRecord& record, const std::string& check_command, Wa
   }
 }
 
+// Warns if two motions were similarly well supported for some time, so that the poses may be relative to moving
+// objects.
+void warn_of_moving_objects(const RunRecord& record, Warnings& warnings) {
+  const std::vector<ContestedInterval> intervals = contested_intervals(record);
+  if (intervals.empty()) return;
+  const ContestedInterval& first = intervals.front();
+  warn(
+      warnings,
+      "two motions explain similarly many landmarks {}{}: if people or vehicles fill the view there, the poses and the "
+      "map from then on may follow them; start where the view is free, or mask what moves (--masks)",
+      interval_text(first.from_s, first.to_s),
+      intervals.size() > 1 ? fmt::format(" and in {} more intervals", intervals.size() - 1) : "");
+}
+
 // Warns of frames and work that were omitted because processing was too slow.
 void warn_of_load(const RunRecord& record, Warnings& warnings) {
   std::int64_t reduced = 0;
@@ -329,6 +343,7 @@ std::vector<std::string> warnings_after_run(const RunRecord& record, const camer
   warn_of_estimate(record, rig, warnings);
   warn_of_losses(record, check_command, warnings);
   warn_of_submaps(record, warnings);
+  warn_of_moving_objects(record, warnings);
   warn_of_load(record, warnings);
   return warnings;
 }

@@ -36,13 +36,19 @@ ordered_json frames_json(const RunRecord& record) {
   for (const ReducedInterval& interval : reduced_intervals(record)) {
     reduced.push_back({{"from", seconds(interval.from_s)}, {"to", seconds(interval.to_s)}, {"level", interval.level}});
   }
+  ordered_json contested = ordered_json::array();
+  for (const ContestedInterval& interval : contested_intervals(record)) {
+    contested.push_back(
+        {{"from", seconds(interval.from_s)}, {"to", seconds(interval.to_s)}, {"frames", interval.frames}});
+  }
   return {{"input", record.frames.size()},
           {"tracked", count(record, FrameOutcome::kTracked)},
           {"lost", count(record, FrameOutcome::kLost)},
           {"dropped", count(record, FrameOutcome::kDropped)},
           {"in_loaded_map", record.map.loaded ? ordered_json(frames_in_loaded_map(record)) : ordered_json()},
           {"lost_intervals", intervals},
-          {"reduced_work", reduced}};
+          {"reduced_work", reduced},
+          {"contested_intervals", contested}};
 }
 
 ordered_json extrinsics_json(const std::optional<ExtrinsicsRecord>& e) {

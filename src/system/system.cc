@@ -1,6 +1,7 @@
 #include "system/system.h"
 
 #include <algorithm>
+#include <ranges>
 
 #include "base/stopwatch.h"
 #include "map/rigs_of_map.h"
@@ -13,9 +14,10 @@ namespace bslam::system {
 namespace {
 
 // Maximum number of keyframes of a map without metric scale that is discarded if tracking is lost, and of a map that is
-// discarded if the cameras that determine its scale contradict it.
+// discarded if the cameras that determine its scale contradict it, or its poses are contested.
 constexpr std::size_t kMaxFailedMap = 4, kMaxContradictedMap = 8;
-// After this number of such maps the contradicting cameras are assumed to be wrong instead.
+// After this number of such maps the contradicting cameras are assumed to be wrong instead, and contested poses to be
+// right.
 constexpr int kMaxContradictions = 3;
 
 // Returns true if the frame is lost although it has features: the map may be wrong.
@@ -142,13 +144,12 @@ Result<FrameRecord> System::process(const image::ImageBundle& images) {
     outcome.record.stages.push_back({"wait", watch.ms()});
     outcome.record.frame_ms += watch.ms();
   }
-  const bool refuted = initialisation_failed(outcome, had_pose);
+  const bool disowned = had_pose && map_disowned(outcome);
+  const bool contradicted = had_pose && !disowned && map_contradicted(outcome);
   frames_.push_back(std::move(outcome.record));
   mark_created_keyframes();
-  if (refuted) {
-    contradictions_ += outcome.seen->scale() == map::Scale::kMetric;
-    discard_map();
-  }
+  contradictions_ += contradicted;
+  if (disowned || contradicted) discard_map();
   FrameRecord record = frames_.back();
   bound_history();
   return record;
@@ -205,15 +206,34 @@ bool System::scale_contradicted(const tracking::TrackResult& result) const {
   return contradicted;
 }
 
-// Returns true if a recent initialisation was wrong: the frames after a monocular one are lost, or the cameras that
-// determine the scale contradict a metric one, which happens if most of their points were on a moving object.
-bool System::initialisation_failed(const Pipeline::Outcome& outcome, bool had_pose) const {
-  if (!had_pose || loaded_) return false;
-  const map::BundledMap& seen = *outcome.seen;
-  const std::size_t keyframes = seen.keyframe_slots() - first_of_map_.index();
-  if (seen.scale() != map::Scale::kMetric) return disowns_map(outcome.record.result) && keyframes <= kMaxFailedMap;
-  return contradictions_ < kMaxContradictions && keyframes <= kMaxContradictedMap &&
-         scale_contradicted(outcome.record.result);
+// Returns true if many poses up to this frame were contested: those of a new map may be relative to a moving object.
+bool System::contested(const tracking::TrackResult& result) const {
+  if (!result.contested) return false;
+  std::size_t frames = 1;
+  for (const FrameRecord& before : std::views::reverse(frames_)) {
+    if (to_seconds(result.time_ns - before.result.time_ns) > tracking::kContestedWithin_s) break;
+    frames += before.result.status == tracking::TrackStatus::kTracking && before.result.contested;
+  }
+  return frames >= tracking::kContestedFrames;
+}
+
+std::size_t System::keyframes_of_new_map(const Pipeline::Outcome& outcome) const {
+  return outcome.seen->keyframe_slots() - first_of_map_.index();
+}
+
+// Returns true if a recent monocular initialisation was wrong: the frames after it are lost.
+bool System::map_disowned(const Pipeline::Outcome& outcome) const {
+  return !loaded_ && outcome.seen->scale() != map::Scale::kMetric && disowns_map(outcome.record.result) &&
+         keyframes_of_new_map(outcome) <= kMaxFailedMap;
+}
+
+// Returns true if a recent initialisation was wrong, because most of its points were on a moving object: the cameras
+// that determine the scale contradict it, or the landmarks support two motions.
+bool System::map_contradicted(const Pipeline::Outcome& outcome) const {
+  if (loaded_ || contradictions_ >= kMaxContradictions || keyframes_of_new_map(outcome) > kMaxContradictedMap)
+    return false;
+  const bool metric = outcome.seen->scale() == map::Scale::kMetric;
+  return (metric && scale_contradicted(outcome.record.result)) || contested(outcome.record.result);
 }
 
 // Drops the oldest records once there are twice as many as configured, so that the mean time per frame is constant.

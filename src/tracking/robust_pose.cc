@@ -35,6 +35,9 @@ constexpr std::size_t kMinOfMotion = 20;
 constexpr double kFractionOfInliers = 1.0 / 3;
 constexpr double kFractionOfOutliers = 1.0 / 3;  // minimum fraction of the outliers of one motion that is another one
 
+// Minimum ratio of the support of another motion to that of the chosen one at which the choice is contested.
+constexpr double kContested = 0.5;
+
 constexpr double kNew = 0.5;           // support of a new landmark
 constexpr double kTrustedAfter = 1.0;  // s, of observation by keyframes
 
@@ -71,25 +74,25 @@ class PoseChoice {
   PoseChoice(const TrackInput& input, const frame::BundledFrame& frame, const FrameMatches& matches,
              std::span<const solver::PoseObservation> observations, const geometry::SE3& predicted,
              solver::PoseSolution first)
-      : map_(input.map), matches_(matches), observations_(observations), best_(std::move(first)) {
+      : map_(input.map), matches_(matches), observations_(observations) {
     if (newly_started(input, frame)) scene_.emplace(input, frame, observations, predicted);
-    if (best_.ok) support_ = support_of(best_);
+    const Support of_first = first.ok ? support_of(first) : Support();
+    candidates_.push_back({std::move(first), of_first});
   }
 
   void consider(solver::PoseSolution other) {
     if (!other.ok) return;
     const Support of_other = support_of(other);
-    if (best_.ok) {
-      Support weighted = of_other;
-      weighted.scale(relative_extent(other));
-      if (weighted.landmarks.sum() < kComparable * support_.landmarks.sum()) return;
-      if (weighted.sum() <= kMoreSupport * support_.sum()) return;
-    }
-    best_ = std::move(other);
-    support_ = of_other;
+    candidates_.push_back({std::move(other), of_other});
+    if (!best().ok || clearly_better(candidates_.back())) best_ = candidates_.size() - 1;
   }
 
-  const solver::PoseSolution& best() const { return best_; }
+  const solver::PoseSolution& best() const { return candidates_[best_].solution; }
+
+  ChosenPose chosen() && {
+    const bool contested = is_contested();
+    return {std::move(candidates_[best_].solution), contested};
+  }
 
  private:
   struct Support {
@@ -103,22 +106,49 @@ class PoseChoice {
     }
   };
 
+  struct Candidate {
+    solver::PoseSolution solution;
+    Support support;
+  };
+
   Support support_of(const solver::PoseSolution& solution) const {
     return {support(map_, matches_, observations_, solution.inlier),
             scene_ ? kNew * scene_->agreeing_cells(solution.T_rig_world) : 0.0};
   }
 
+  bool clearly_better(const Candidate& other) const {
+    const Support& of_best = candidates_[best_].support;
+    Support weighted = other.support;
+    weighted.scale(relative_extent(other.solution));
+    return weighted.landmarks.sum() >= kComparable * of_best.landmarks.sum() &&
+           weighted.sum() > kMoreSupport * of_best.sum();
+  }
+
+  bool is_contested() const {
+    return best().ok && std::ranges::any_of(candidates_, [&](const Candidate& other) {
+             return other.solution.ok && other.support.sum() > kContested * candidates_[best_].support.sum() &&
+                    are_two_motions(exclusive(other.solution, best()).size(), other.solution,
+                                    exclusive(best(), other.solution).size());
+           });
+  }
+
   // The factor by which the support of another pose counts more or less than that of the best one: the ratio of the
   // extents in space of the landmarks that agree with only one of the two. Landmarks that agree with both are far away.
   double relative_extent(const solver::PoseSolution& other) const {
-    const std::vector<Eigen::Vector3d> of_other = exclusive(other, best_), of_best = exclusive(best_, other);
-    if (!is_motion(of_other.size(), other) || !is_motion(of_best.size(), best_)) return 1.0;
+    const std::vector<Eigen::Vector3d> of_other = exclusive(other, best()), of_best = exclusive(best(), other);
+    if (!are_two_motions(of_other.size(), other, of_best.size())) return 1.0;
     const double ratio = extent(of_other) / extent(of_best);
     if (!(ratio >= kWider || ratio <= 1.0 / kWider)) return 1.0;  // also if both extents are zero
     // Outliers that are no motion agree with another pose by chance, and are spread widely.
-    const auto outliers = static_cast<double>(std::ranges::count(best_.inlier, std::uint8_t{0}));
+    const auto outliers = static_cast<double>(std::ranges::count(best().inlier, std::uint8_t{0}));
     if (ratio > 1.0 && static_cast<double>(of_other.size()) < kFractionOfOutliers * outliers) return 1.0;
     return std::clamp(ratio, 1.0 / kMaxWider, kMaxWider);
+  }
+
+  // Whether another pose and the best one are those of two motions, by the numbers of inliers of each that are not
+  // inliers of the other.
+  bool are_two_motions(std::size_t of_other, const solver::PoseSolution& other, std::size_t of_best) const {
+    return is_motion(of_other, other) && is_motion(of_best, best());
   }
 
   // Whether this number of inliers that agree with no other pose shows that a pose is that of a motion of its own.
@@ -139,8 +169,8 @@ class PoseChoice {
   const FrameMatches& matches_;
   std::span<const solver::PoseObservation> observations_;
   std::optional<SceneMatches> scene_;
-  solver::PoseSolution best_;
-  Support support_;
+  std::vector<Candidate> candidates_;
+  std::size_t best_ = 0;  // index of a candidate
 };
 
 std::vector<solver::PoseObservation> outliers(const solver::PoseSolution& solution,
@@ -229,12 +259,12 @@ std::vector<std::uint8_t> agreeing_beyond_chance(const camera::Rig& rig,
   return beyond ? at_pose.inlier : std::vector<std::uint8_t>(observations.size(), 0);
 }
 
-solver::PoseSolution robust_pose(const TrackInput& input, const frame::BundledFrame& frame, const FrameMatches& matches,
-                                 std::span<const solver::PoseObservation> observations, const geometry::SE3& predicted,
-                                 const solver::MotionModel& motion, const solver::PoseSolverOptions& options) {
+ChosenPose robust_pose(const TrackInput& input, const frame::BundledFrame& frame, const FrameMatches& matches,
+                       std::span<const solver::PoseObservation> observations, const geometry::SE3& predicted,
+                       const solver::MotionModel& motion, const solver::PoseSolverOptions& options) {
   const camera::Rig& rig = input.map.rig();
   solver::PoseSolution first = solver::solve_pose(rig, observations, predicted, motion, options);
-  if (!few(first, kFewInliers, observations.size())) return first;
+  if (!few(first, kFewInliers, observations.size())) return {std::move(first)};
   solver::PoseSolverOptions near_start = options;
   near_start.first_chi2 = kAgreesWithStart;
   const auto pose_near = [&](const geometry::SE3& start) {
@@ -245,31 +275,31 @@ solver::PoseSolution robust_pose(const TrackInput& input, const frame::BundledFr
   PoseChoice choice(input, frame, matches, observations, predicted, std::move(first));
   if (of_outliers.ok) choice.consider(pose_near(of_outliers.T_rig_world));
   choice.consider(pose_near(predicted));
-  if (!few(choice.best(), kMinority, observations.size())) return choice.best();
+  if (!few(choice.best(), kMinority, observations.size())) return std::move(choice).chosen();
   const solver::PoseSolution sampled =
       estimators::ransac_pose(frame::rig_of(rig, frame), observations, predicted, options, {},
                               Random(input.seed, "pose", static_cast<std::uint64_t>(frame.id.value())));
   if (sampled.ok) choice.consider(pose_near(sampled.T_rig_world));
-  return choice.best();
+  return std::move(choice).chosen();
 }
 
-solver::PoseSolution sampled_pose(const TrackInput& input, const frame::BundledFrame& frame,
-                                  const FrameMatches& matches, std::span<const solver::PoseObservation> observations,
-                                  const geometry::SE3& predicted, const solver::PoseSolverOptions& options) {
+ChosenPose sampled_pose(const TrackInput& input, const frame::BundledFrame& frame, const FrameMatches& matches,
+                        std::span<const solver::PoseObservation> observations, const geometry::SE3& predicted,
+                        const solver::PoseSolverOptions& options) {
   const camera::Rig rig = frame::rig_of(input.map.rig(), frame);
   const auto sample = [&](std::span<const solver::PoseObservation> from, const char* name) {
     return estimators::ransac_pose(rig, from, predicted, options, {},
                                    Random(input.seed, name, static_cast<std::uint64_t>(frame.id.value())));
   };
   solver::PoseSolution first = sample(observations, "wide search");
-  if (!few(first, kFewInliers, observations.size())) return first;
+  if (!few(first, kFewInliers, observations.size())) return {std::move(first)};
   solver::PoseSolverOptions near_start = options;
   near_start.first_chi2 = kAgreesWithStart;
   const auto of_outliers = first.ok ? sample(outliers(first, observations), "outliers") : solver::PoseSolution();
   PoseChoice choice(input, frame, matches, observations, predicted, std::move(first));
   if (of_outliers.ok) choice.consider(solver::solve_pose(rig, observations, of_outliers.T_rig_world, near_start));
   choice.consider(solver::solve_pose(rig, observations, predicted, near_start));
-  return choice.best();
+  return std::move(choice).chosen();
 }
 
 }  // namespace bslam::tracking

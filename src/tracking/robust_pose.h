@@ -39,20 +39,28 @@ std::vector<std::uint8_t> agreeing_beyond_chance(const camera::Rig& rig,
                                                  std::span<const double> window_px, const geometry::SE3& T_rig_world,
                                                  const solver::MotionModel& motion);
 
+// A pose chosen among those of several motions.
+struct ChosenPose {
+  solver::PoseSolution solution;
+  // Another motion, of which many landmarks agree with this one only, has more than half of its support: one of the two
+  // is that of moving objects, and the choice may be wrong.
+  bool contested = false;
+};
+
 // As solver::solve_pose for the matches of a frame, in order; `predicted` is the initial pose. A robust kernel
 // converges to the majority of the matches, or between two motions that both have many matches. If a considerable part
 // of the matches are outliers, further poses are estimated: from the outliers, from the matches that agree with the
 // prediction, and by RANSAC if still most of them are outliers. Another pose replaces the first one if its support is
 // clearly larger, or if the first one could not be estimated. In a map that was just started, the agreement of all
 // keypoints adds to the support (tracking/scene_agreement.h).
-solver::PoseSolution robust_pose(const TrackInput& input, const frame::BundledFrame& frame, const FrameMatches& matches,
-                                 std::span<const solver::PoseObservation> observations, const geometry::SE3& predicted,
-                                 const solver::MotionModel& motion, const solver::PoseSolverOptions& options);
+ChosenPose robust_pose(const TrackInput& input, const frame::BundledFrame& frame, const FrameMatches& matches,
+                       std::span<const solver::PoseObservation> observations, const geometry::SE3& predicted,
+                       const solver::MotionModel& motion, const solver::PoseSolverOptions& options);
 
 // The same for matches found in wide windows, many of which are wrong: the first pose and that of its outliers are
 // estimated by RANSAC.
-solver::PoseSolution sampled_pose(const TrackInput& input, const frame::BundledFrame& frame,
-                                  const FrameMatches& matches, std::span<const solver::PoseObservation> observations,
-                                  const geometry::SE3& predicted, const solver::PoseSolverOptions& options);
+ChosenPose sampled_pose(const TrackInput& input, const frame::BundledFrame& frame, const FrameMatches& matches,
+                        std::span<const solver::PoseObservation> observations, const geometry::SE3& predicted,
+                        const solver::PoseSolverOptions& options);
 
 }  // namespace bslam::tracking

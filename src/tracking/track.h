@@ -53,7 +53,14 @@ struct TrackResult {
   // that initialised a map, or was located at the end of the run.
   std::optional<geometry::Matrix6d> covariance;
   std::vector<CameraCounts> cameras;
+  // Two motions had comparable support by the landmarks, of which one is that of moving objects.
+  bool contested = false;
 };
+
+// Number of contested frames within this time from which on poses may be relative to moving objects. Single ones are
+// usual.
+inline constexpr std::size_t kContestedFrames = 5;
+inline constexpr double kContestedWithin_s = 1.0;
 
 struct LocalView;  // tracking/visible_landmarks.h
 

@@ -22,6 +22,7 @@ struct TrackedFrame {
   solver::PoseSolution solution;
   FrameMatches matches;             // all, inliers and outliers
   std::vector<LandmarkId> visible;  // landmarks that were searched for, each once
+  bool contested = false;           // see TrackResult
 };
 
 // The output for a frame with a pose. The states of its cameras and the decision on a keyframe are left to the caller.

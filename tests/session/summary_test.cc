@@ -47,9 +47,10 @@ TEST(Summary, HasTheDocumentedKeysInOrder) {
                 "maps_started", "parts",   "time",        "work",     "memory", "warnings"}));
   EXPECT_EQ(json["warnings"].dump(), R"(["cam0: blurred"])");
   EXPECT_EQ(keys(json["frames"]), (std::vector<std::string>{"input", "tracked", "lost", "dropped", "in_loaded_map",
-                                                            "lost_intervals", "reduced_work"}));
+                                                            "lost_intervals", "reduced_work", "contested_intervals"}));
   EXPECT_EQ(json["frames"]["lost_intervals"].dump(), R"([{"from":1.25,"to":1.25,"reason":"too few matches"}])");
   EXPECT_EQ(json["frames"]["reduced_work"], ordered_json::array());
+  EXPECT_EQ(json["frames"]["contested_intervals"], ordered_json::array());
   EXPECT_EQ(json["cameras"].dump(),
             R"([{"name":"cam0","images":400,"skipped":1,)"
             R"("states":[{"state":"degraded","reason":"blurred","from":0.0,"to":1.5}],)"
@@ -139,6 +140,33 @@ TEST(LostIntervals, JoinConsecutiveLostFrames) {
   EXPECT_EQ(intervals[1].reason, "too few matches");
   EXPECT_EQ(intervals[2].from_s, 0.7);
   EXPECT_TRUE(lost_intervals({}).empty());
+}
+
+RunFrame contested(double time_s) {
+  RunFrame out = frame(time_s);
+  out.record->result.contested = true;
+  return out;
+}
+
+TEST(ContestedIntervals, HaveFiveContestedFramesWithinASecond) {
+  RunRecord record;
+  for (const double time_s : {0.0, 0.5, 1.5, 2.0, 2.6}) record.frames.push_back(contested(time_s));  // in 2.6 s
+  EXPECT_TRUE(contested_intervals(record).empty());
+  for (const double time_s : {10.0, 10.1, 10.25, 10.5}) record.frames.push_back(contested(time_s));
+  record.frames.push_back(frame(10.75));
+  EXPECT_TRUE(contested_intervals(record).empty());
+  for (const double time_s : {11.0, 11.05}) record.frames.push_back(contested(time_s));  // 10.1 - 11.05 also
+  for (const double time_s : {20.0, 20.25, 20.5, 20.75}) record.frames.push_back(contested(time_s));
+  record.frames.push_back(dropped(20.9));
+  record.frames.push_back(contested(21.0));
+  const auto intervals = contested_intervals(record);
+  ASSERT_EQ(intervals.size(), 2u);
+  EXPECT_EQ(intervals[0].from_s, 10.0);
+  EXPECT_EQ(intervals[0].to_s, 11.05);
+  EXPECT_EQ(intervals[0].frames, 6);
+  EXPECT_EQ(intervals[1].from_s, 20.0);
+  EXPECT_EQ(intervals[1].to_s, 21.0);
+  EXPECT_EQ(intervals[1].frames, 5);
 }
 
 TEST(CameraIntervals, MergeEqualConsecutiveStatuses) {

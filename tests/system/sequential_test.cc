@@ -203,6 +203,33 @@ TEST_F(SystemContradictedMap, IsKeptAfterSeveralOthers) {
   for (int before = 0; before < 4; ++before) EXPECT_EQ(contradict(system, 8).map_withdrawn, before < 3) << before;
 }
 
+// All images are at rest but for their left half, which is displaced in every third frame.
+TEST(SystemSequential, DiscardsANewMapOfTwoMotions) {
+  const RenderedTour tour(2, 16);
+  Config config = small_config(execution::Mode::kSequential);
+  config.tracking.keyframe.min_interval = 18;  // so that the map contains one of the motions only
+  System system(tour.rig(), config);
+  std::size_t contested = 0, discarded = 0;
+  for (std::size_t k = 0; k < 18; ++k) {
+    image::ImageBundle frame = tour.replayed(0, k);
+    const image::ImageBundle& moved = tour.frames()[k % 3 == 2 ? 2 : 0];
+    for (std::size_t c = 0; c < 2; ++c) {
+      image::Image& image = frame.images[c].image;
+      for (int y = 0; y < image.height(); ++y)
+        std::copy_n(moved.images[c].image.row(y), image.width() / 2, image.row(y));
+    }
+    const FrameRecord record = must_process(system, frame);
+    contested += record.result.contested;
+    if (record.map_withdrawn) {
+      EXPECT_GE(contested, tracking::kContestedFrames);
+      EXPECT_EQ(tracked_frames(system), 0u);
+      EXPECT_EQ(system.snapshot()->num_keyframes(), 0u);
+      ++discarded;
+    }
+  }
+  EXPECT_EQ(discarded, 1u);
+}
+
 TEST(SystemSequential, DiscardsANewMapUpToScaleAndItsPosesIfLost) {
   const RenderedTour tour(1, 16);
   System system(tour.rig(), small_config(execution::Mode::kSequential));

@@ -59,7 +59,9 @@ class RobustPose : public ::testing::Test {
     return (solution.T_rig_world.inverse().translation() - truth.inverse().translation()).norm();
   }
 
-  solver::PoseSolution pose(const geometry::SE3& predicted) const {
+  solver::PoseSolution pose(const geometry::SE3& predicted) const { return chosen(predicted).solution; }
+
+  ChosenPose chosen(const geometry::SE3& predicted) const {
     const TrackerState state;
     return robust_pose({.map = world.map, .pyramids = {}, .alignment = {}, .state = state}, seen.frame, matches,
                        observations, predicted, motion, {});
@@ -80,6 +82,22 @@ TEST_F(RobustPose, FollowsLandmarksThatManyKeyframesObserve) {
   const auto solution = pose(predicted);
   ASSERT_TRUE(solution.ok);
   EXPECT_LT(error(solution), 0.005);
+}
+
+// Whether they agree in two groups of landmarks, or a third of them agree with no motion.
+TEST_F(RobustPose, IsContestedByAnotherMotionAndNotByOutliers) {
+  const geometry::SE3 predicted = truth.perturbed((geometry::Vector6d() << 0, 1e-3, 0, 0.002, 0, 0.001).finished());
+  EXPECT_FALSE(chosen(predicted).contested);
+  const std::vector<solver::PoseObservation> at_rest = observations;
+  move({0.2, 0.05, -0.1}, {0.2, 0.05, -0.1});
+  EXPECT_TRUE(chosen(predicted).contested);
+  observations = at_rest;
+  Random random(1, "outliers", 0);
+  for (std::size_t i = 0; i < observations.size(); i += 3)
+    observations[i].pixel += 40 * Eigen::Vector2d(random.uniform() - 0.5, random.uniform() - 0.5);
+  const ChosenPose scattered = chosen(predicted);
+  EXPECT_LT(error(scattered.solution), 0.005);
+  EXPECT_FALSE(scattered.contested);
 }
 
 TEST_F(RobustPose, FollowsTheMajorityIfThePredictionIsWrong) {
@@ -109,10 +127,11 @@ TEST_F(RobustPose, OfWideWindowsFollowsTheLargerSupportAsWell) {
   ASSERT_TRUE(majority.ok);
   EXPECT_GT(error(majority), 0.05);
   const TrackerState state;
-  const auto solution = sampled_pose({.map = world.map, .pyramids = {}, .alignment = {}, .state = state}, seen.frame,
-                                     matches, observations, predicted, {});
+  const auto [solution, contested] = sampled_pose({.map = world.map, .pyramids = {}, .alignment = {}, .state = state},
+                                                  seen.frame, matches, observations, predicted, {});
   ASSERT_TRUE(solution.ok);
   EXPECT_LT(error(solution), 0.005);
+  EXPECT_TRUE(contested);
 }
 
 // What moves outnumbers the rest in the images of every camera, so that no pose from a single camera is right. If the
