@@ -22,6 +22,8 @@ enum class Mode {
   kLagged,      // in separate threads; each result is used a fixed number of frames later: identical results as well
   kParallel     // in separate threads; each result is used as soon as it is available: for live use, the default
 };
+// In the last two modes a frame does not wait for the first tests of the calibration against the images, as it does in
+// bslam run. Set execution.await_calibration for recordings with a calibration that may be wrong.
 
 // Description of one setting.
 struct Setting {

@@ -43,14 +43,19 @@ struct CameraResult {
   // "" if ok, otherwise no-images (for a camera that has not delivered any image yet: after ten frames), black,
   // over-exposed, frozen, inconsistent, blurred or few-features. Points to static storage.
   std::string_view reason;
-  int keypoints = 0;  // number of keypoints in the image; without extraction: landmarks searched for in it
-  int matched = 0;    // keypoints matched to landmarks of the map
-  int inliers = 0;    // matched keypoints that are consistent with the pose
+  // Number of keypoints in the image. Between keyframes most frames are tracked without extracting keypoints
+  // (tracking.frontend): then the number of landmarks that were searched for in the image.
+  int keypoints = 0;
+  int matched = 0;  // keypoints matched to landmarks of the map
+  int inliers = 0;  // matched keypoints that are consistent with the pose
 };
 
 struct StageTime {
-  std::string_view stage;  // "extract", "bundle", "track", ...; points to static storage
-  double ms = 0;           // wall time in the caller's thread
+  // Points to static storage: "pyramids"; "align": landmarks are aligned directly; "extract", "bundle", "track": with
+  // keypoints; "start": a map is started; "relocalise"; "results": waiting for results of other threads; "wait":
+  // waiting for space in their queues.
+  std::string_view stage;
+  double ms = 0;  // wall time in the caller's thread
 };
 
 struct FrameResult {
@@ -68,16 +73,18 @@ struct FrameResult {
   Pose T_world_cam0, T_world_body;
   // Scale of the map, which determines the unit of length of all poses and velocities. Valid if tracking.
   Scale scale = Scale::kMetric;
-  int submap = -1;  // id of the first keyframe of the submap of these poses
+  int submap = -1;  // the submap of these poses: id of its first keyframe, its root
   // Covariance of T_world_cam0, if known: of the small motion d, rotation first, in the axes of camera 0, with
   // T_world_cam0(true) = T_world_cam0 exp(d). Relative to the first keyframe of the submap, or to a loaded map: image
   // noise, the drift of the map and, if the calibration was estimated from the images, its remaining error, such as
   // that of the scale of the baselines. A given calibration is taken as exact after the images of about eight keyframes
   // have not contradicted it, or if calibration.refine is false; until then, the covariance contains the error that it
   // may have. The standard deviations of the position of camera 0 along its own axes are the square roots of elements
-  // 21, 28 and 35. Nullopt in the first frame of a map.
+  // 21, 28 and 35. Nullopt in the first frame of a map. That of T_world_body in the axes of the body is A covariance
+  // A^T with the adjoint A of T_body_cam0.
   std::optional<Covariance6> covariance;
-  // Velocity of the body frame in its own axes, averaged since the previous frame; nullopt if that frame has no pose.
+  // Velocity of the body frame in its own axes, averaged since the previous frame; nullopt if that frame has no pose or
+  // was more than half a second earlier.
   std::optional<Velocity> velocity;
 
   // The odometry pose (the `odom` frame of ROS REP 105): continuous, since corrections of the map do not change it, and

@@ -40,11 +40,14 @@ struct SyncOptions {
   // How long a bundle waits for a missing image, in time stamps of other images. It is checked when an image arrives,
   // so the delay may be one image interval longer, and a bundle waits as long as no camera delivers.
   double max_wait_s = 0.1;
-  double reorder_s = 0;       // maximum time difference between images of one camera that arrive out of order
+  // Maximum time difference between images of one camera that arrive out of order; if it is larger, they may be too
+  // late. Bundles wait so much longer for such images, but not longer than max_wait_s.
+  double reorder_s = 0;
   double silent_after_s = 1;  // a camera without an image for this long is ignored until it delivers again
   // An image that is ahead of all others by more than this time and more than four intervals of its camera is dropped,
-  // unless the next two images of the camera confirm its clock. After an image that is ahead by less, all images with
-  // earlier times are too late. Clocks that go back are not followed: create a new Synchronizer then, and a new System.
+  // unless the next two images of the camera confirm its clock. An image that is ahead by less ends the waiting for
+  // images that are earlier by more than max_wait_s, which are too late if they come. Clocks that go back are not
+  // followed: create a new Synchronizer then, and a new System.
   double max_ahead_s = 1;
   // Maximum number of waiting images per camera; if it is exceeded, the oldest bundle is completed without its missing
   // images.

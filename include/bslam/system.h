@@ -51,7 +51,7 @@ struct CameraEvent {
 struct Callbacks {
   std::function<void(const KeyframeEvent&)> keyframe;
   std::function<void(const LoopEvent&)> loop;
-  std::function<void(const MapView&)> map;  // the version of the map has changed since the last call
+  std::function<void(const MapView&)> map;  // the map has changed since this callback was last called
   std::function<void(const CameraEvent&)> camera;
   // Receives log lines without line breaks; the library itself prints nothing. Also called by System::create().
   std::function<void(LogLevel, std::string_view line)> log;
@@ -60,7 +60,7 @@ struct Callbacks {
 // Optional input of a System in addition to rig and configuration.
 struct Startup {
   std::filesystem::path map = {};         // saved map to continue after relocalising in it; empty: a new map
-  std::filesystem::path vocabulary = {};  // bslam or DBoW2 text format; empty: the vocabulary shipped with bslam
+  std::filesystem::path vocabulary = {};  // bslam or DBoW2 text format; empty: the one within the library
   bool place_recognition = true;          // false: no loop closing; a lost rig is only recovered near the place of loss
   // Minimum number of latest frames that trajectory() returns. Older frames are discarded, so that memory grows with
   // the map only. 0: all frames are kept.

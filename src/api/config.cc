@@ -24,7 +24,9 @@ execution::Mode internal(Mode mode) {
 
 }  // namespace
 
-Config::Config() : impl_(std::make_unique<Impl>()) {}
+Config::Config() : impl_(std::make_unique<Impl>()) {
+  impl_->config.execution.await_calibration = false;  // for live use
+}
 Config::Config(const Config& other) : impl_(std::make_unique<Impl>(*other.impl_)) {}
 Config& Config::operator=(const Config& other) {
   *impl_ = *other.impl_;

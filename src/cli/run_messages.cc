@@ -41,6 +41,12 @@ std::string excess_text(const session::CalibrationRecord& calibration) {
                      100 * calibration.estimate.excess_error, 100 * calibration.excess_bound);
 }
 
+// What a calibration that the images contradict means for the results.
+std::string_view consequence_text(const session::CalibrationRecord& calibration) {
+  return calibration.refined ? "; the results use the refined one"
+                             : "; it was not refined: poses and scale are less accurate than with a right one";
+}
+
 // The reason why the estimate of the calibration does not apply.
 std::string doubt_text(const session::RunRecord& record) {
   std::string text;
@@ -82,7 +88,8 @@ void print_verdict(const session::RunRecord& record) {
     case calibration::Verdict::kConsistent:
       return fmt::print("calibration: consistent with the images{}\n", excess_text(calibration));
     case calibration::Verdict::kInconsistent:
-      return fmt::print("calibration: contradicted by the images{}\n", excess_text(calibration));
+      return fmt::print("calibration: contradicted by the images{}{}\n", excess_text(calibration),
+                        consequence_text(calibration));
     case calibration::Verdict::kUnknown:
       break;
   }

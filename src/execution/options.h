@@ -41,7 +41,7 @@ struct ExecutionOptions {
     visitor(
         "await_calibration", self.await_calibration, Range{}, "",
         "at the start, frames wait until the images have been compared with the calibration; ignored by bslam live and "
-        "with --late drop; must be false for a System that is fed in real time");
+        "with --late drop; false by default in the C++ and Python interfaces");
     visitor("lag_keyframe", self.lag_keyframe, Range{1, 10}, "frames",
             "lagged mode: delay from the request of a keyframe to its use");
     visitor("lag_map", self.lag_map, Range{1, 10000}, "frames",

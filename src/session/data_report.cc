@@ -12,6 +12,7 @@
 
 #include "base/median.h"
 #include "dataset/recording_description.h"
+#include "dataset/time_stamps.h"
 
 namespace bslam::session {
 namespace {
@@ -20,10 +21,11 @@ using dataset::RecordingDescription;
 using dataset::StreamDescription;
 using Json = nlohmann::ordered_json;
 
-// Images or messages per second; 0 if unknown. Gaps do not change it, where all times are known.
+// Images or messages per second; 0 if unknown, also if the times of images are hardly in nanoseconds. Gaps do not
+// change it, where all times are known.
 double rate_hz(const StreamDescription& stream) {
   const std::vector<TimeNs>& t = stream.times;
-  if (t.size() < 2 || t.back() <= t.front()) return 0;
+  if (t.size() < 2 || t.back() <= t.front() || (stream.camera >= 0 && !dataset::are_nanoseconds(t))) return 0;
   if (t.size() == 2) return static_cast<double>(stream.count - 1) / to_seconds(t.back() - t.front());
   std::vector<TimeNs> intervals;
   for (std::size_t k = 1; k < t.size(); ++k) intervals.push_back(t[k] - t[k - 1]);

@@ -66,7 +66,7 @@ Status check_tour(const SimulationRequest& r) {
 }
 
 Status check_request(const SimulationRequest& r) {
-  if (!(within(r.recording.duration_s, 1e-3, 86400)))
+  if (!(within(r.recording.duration_s, 1e-3, kMaxDuration_s)))
     return out_of_range("duration", r.recording.duration_s, "seconds in (0, 86400]");
   if (!(within(r.recording.rate_hz, 1e-3, 1000)))
     return out_of_range("rate", r.recording.rate_hz, "images per second in (0, 1000]");

@@ -7,6 +7,8 @@
 
 namespace bslam::simulator {
 
+inline constexpr double kMaxDuration_s = 86400.0;  // of a recording
+
 // Checks speed, length and laps.
 Status check_tour(const SimulationRequest& request);
 

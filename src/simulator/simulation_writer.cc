@@ -243,7 +243,12 @@ Status write_lists(const SimulationRequest& request, const std::vector<Shot>& sh
 Result<double> drive_duration(const SimulationRequest& request) {
   BSLAM_ASSERT(request.kind == WorldKind::kTown, "only drives through the town have a duration of their own");
   if (const Status s = check_tour(request); !s) return s.error();
-  return make_scenery(request.kind, request.seed, request.tour, request.world).section_ends.back();
+  const double duration_s = make_scenery(request.kind, request.seed, request.tour, request.world).section_ends.back();
+  if (duration_s > kMaxDuration_s) {
+    return Error{"", "length", fmt::format("a drive of {:.0f} s", duration_s),
+                 fmt::format("at most {:.0f} s: a shorter length, a higher --speed, or a --duration", kMaxDuration_s)};
+  }
+  return duration_s;
 }
 
 std::string simulation_digest(const SimulationRequest& r) {

@@ -48,7 +48,7 @@ Result<SimulationOutcome> write_simulation(const SimulationRequest& request, Thr
                                            const SimulationProgress& progress = {}, std::stop_token stop = {});
 
 // Returns the duration in seconds of a whole drive through the town. The recording may be shorter. Errors: a length or
-// speed out of range.
+// speed out of range, a drive that takes longer than a recording may.
 Result<double> drive_duration(const SimulationRequest& request);
 
 // Returns a digest of everything that determines the content of the recording: 16 hexadecimal digits.

@@ -134,6 +134,7 @@ TEST(PublicConfig, SetsByNameAndRejectsInvalidValues) {
   EXPECT_FALSE(config.set_seed(-1));
   EXPECT_FALSE(config.get("nothing"));
   EXPECT_EQ(*config.get("features.per_image"), "777");
+  EXPECT_EQ(*config.get("execution.await_calibration"), "false");  // no frame of live cameras waits
   config.set_mode(Mode::kLagged);
   EXPECT_EQ(*config.get("mode"), "lagged");
 }

@@ -282,6 +282,15 @@ class TownWriter : public SimulationWriter {
   }
 };
 
+TEST_F(TownWriter, HasNoDurationIfADriveTakesMoreThanADay) {
+  SimulationRequest r = drive();
+  r.tour.length_m = 100e3;
+  r.tour.speed_mps = 1.0;
+  const auto duration_s = drive_duration(r);
+  ASSERT_FALSE(duration_s.ok());
+  EXPECT_EQ(duration_s.error().key, "length");
+}
+
 TEST_F(TownWriter, ContinuesInAnySection) {
   SimulationRequest whole = drive(), r = drive();
   EXPECT_NEAR(r.recording.duration_s, 29, 3);
