@@ -89,8 +89,8 @@ class BSLAM_EXPORT Synchronizer {
   static Result<Synchronizer> create(const Rig& rig, SyncOptions options = {});
   Synchronizer(Synchronizer&& other) noexcept;
   Synchronizer& operator=(Synchronizer&& other) noexcept;
-  // Ends calls of wait(), which return nullopt, and returns after them. No other call may be in progress or follow:
-  // close it and join the threads that use it first.
+  // Ends calls of wait() and wait_for(), which return nullopt, and returns after them. No other call may be in progress
+  // or follow: close it and join the threads that use it first.
   ~Synchronizer();
 
   // Adds an image of one camera. Its pixels are shared if it has an `owner`, otherwise copied. Success does not mean
@@ -104,6 +104,9 @@ class BSLAM_EXPORT Synchronizer {
 
   // Waits for the next bundle. Returns nullopt when the synchroniser is closed and all bundles were fetched.
   std::optional<ImageBundle> wait();
+
+  // The same, but also returns nullopt after this time in seconds without a bundle, as when all cameras have stopped.
+  std::optional<ImageBundle> wait_for(double timeout_s);
 
   // Declares that no images follow: all waiting images become bundles, whose number is not limited. Errors: only an
   // exception of on_drop, in which case the synchroniser is closed nevertheless.

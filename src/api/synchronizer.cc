@@ -1,6 +1,8 @@
 #include <bslam/synchronizer.h>
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <condition_variable>
 #include <cstring>
@@ -72,7 +74,7 @@ struct Synchronizer::Impl {
   Status report(const std::vector<DroppedImage>& dropped, const char* name) const;
   void commit(std::vector<ImageBundle> bundles, std::vector<DroppedImage>& dropped, std::size_t limit);
   std::optional<ImageBundle> take();
-  std::optional<ImageBundle> wait();
+  std::optional<ImageBundle> wait(std::optional<double> timeout_s);
   void end();  // returns when no call of wait() is in progress
 
   const camera::Rig rig;
@@ -158,10 +160,16 @@ std::optional<ImageBundle> Synchronizer::Impl::take() {
   return bundle;
 }
 
-std::optional<ImageBundle> Synchronizer::Impl::wait() {
+std::optional<ImageBundle> Synchronizer::Impl::wait(std::optional<double> timeout_s) {
   std::unique_lock lock(mutex);
   ++waiting_threads;
-  changed.wait(lock, [&] { return closed || !ready.empty(); });
+  const auto done = [&] { return closed || !ready.empty(); };
+  if (timeout_s) {
+    const double limit_s = *timeout_s > 0 ? std::min(*timeout_s, kMaxSeconds) : 0.0;  // 0 also for NaN
+    changed.wait_for(lock, std::chrono::duration<double>(limit_s), done);
+  } else {
+    changed.wait(lock, done);
+  }
   std::optional<ImageBundle> bundle = take();
   --waiting_threads;
   if (closed) changed.notify_all();  // with the mutex held: end() may destroy this afterwards
@@ -207,7 +215,12 @@ std::optional<ImageBundle> Synchronizer::pop() {
 
 std::optional<ImageBundle> Synchronizer::wait() {
   if (!impl_) return std::nullopt;
-  return impl_->wait();
+  return impl_->wait(std::nullopt);
+}
+
+std::optional<ImageBundle> Synchronizer::wait_for(double timeout_s) {
+  if (!impl_) return std::nullopt;
+  return impl_->wait(timeout_s);
 }
 
 Status Synchronizer::close() {

@@ -379,6 +379,17 @@ TEST(Synchronizer, ItsEndEndsCallsOfWait) {
   }
 }
 
+TEST(Synchronizer, WaitsForALimitedTimeIfAskedTo) {
+  auto synchronizer = Synchronizer::create(rig_of(1)).value();
+  for (const double none : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN(), 0.02})
+    EXPECT_FALSE(synchronizer.wait_for(none)) << none;
+  std::jthread camera([&] { EXPECT_TRUE(synchronizer.push(0, image_at(50 * kMs))); });
+  EXPECT_EQ(times_of(*synchronizer.wait_for(std::numeric_limits<double>::infinity())), std::vector<std::int64_t>{50});
+  camera.join();
+  EXPECT_TRUE(synchronizer.close());
+  EXPECT_FALSE(synchronizer.wait_for(1e9));
+}
+
 TEST(Synchronizer, HoldsABoundedNumberOfImagesAndBundles) {
   const auto drops = std::make_shared<std::size_t>(0);
   SyncOptions options{.max_wait_s = 1000, .silent_after_s = 1000, .max_images = 5, .max_bundles = 3};
