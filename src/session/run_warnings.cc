@@ -255,10 +255,10 @@ void warn_of_pairs(const RunRecord& record, const std::string& check_command, Wa
 }
 
 // Warns if two motions were similarly well supported for some time, so that the poses may be relative to moving
-// objects.
+// objects, unless a late camera or a wrong calibration explains it.
 void warn_of_moving_objects(const RunRecord& record, Warnings& warnings) {
   const std::vector<ContestedInterval> intervals = contested_intervals(record);
-  if (intervals.empty()) return;
+  if (intervals.empty() || record.calibration.late || record.calibration.foreign_images()) return;
   const ContestedInterval& first = intervals.front();
   warn(
       warnings,

@@ -14,9 +14,9 @@ namespace bslam::system {
 namespace {
 
 // Maximum number of keyframes of a map without metric scale that is discarded if tracking is lost, and of a map that is
-// discarded if the cameras that determine its scale contradict it, or its poses are contested.
+// discarded if the cameras that determine its scale contradict it, or its poses are undecided.
 constexpr std::size_t kMaxFailedMap = 4, kMaxContradictedMap = 8;
-// After this number of such maps the contradicting cameras are assumed to be wrong instead, and contested poses to be
+// After this number of such maps the contradicting cameras are assumed to be wrong instead, and undecided poses to be
 // right.
 constexpr int kMaxContradictions = 3;
 
@@ -206,13 +206,13 @@ bool System::scale_contradicted(const tracking::TrackResult& result) const {
   return contradicted;
 }
 
-// Returns true if many poses up to this frame were contested: those of a new map may be relative to a moving object.
-bool System::contested(const tracking::TrackResult& result) const {
-  if (!result.contested) return false;
+// Returns true if many poses up to this frame were undecided: those of a new map may be relative to a moving object.
+bool System::undecided(const tracking::TrackResult& result) const {
+  if (!result.undecided) return false;
   std::size_t frames = 1;
   for (const FrameRecord& before : std::views::reverse(frames_)) {
     if (to_seconds(result.time_ns - before.result.time_ns) > tracking::kContestedWithin_s) break;
-    frames += before.result.status == tracking::TrackStatus::kTracking && before.result.contested;
+    frames += before.result.status == tracking::TrackStatus::kTracking && before.result.undecided;
   }
   return frames >= tracking::kContestedFrames;
 }
@@ -233,7 +233,7 @@ bool System::map_contradicted(const Pipeline::Outcome& outcome) const {
   if (loaded_ || contradictions_ >= kMaxContradictions || keyframes_of_new_map(outcome) > kMaxContradictedMap)
     return false;
   const bool metric = outcome.seen->scale() == map::Scale::kMetric;
-  return (metric && scale_contradicted(outcome.record.result)) || contested(outcome.record.result);
+  return (metric && scale_contradicted(outcome.record.result)) || undecided(outcome.record.result);
 }
 
 // Drops the oldest records once there are twice as many as configured, so that the mean time per frame is constant.

@@ -126,7 +126,7 @@ class System {
 
  private:
   bool scale_contradicted(const tracking::TrackResult& result) const;
-  bool contested(const tracking::TrackResult& result) const;
+  bool undecided(const tracking::TrackResult& result) const;
   std::size_t keyframes_of_new_map(const Pipeline::Outcome& outcome) const;
   bool map_disowned(const Pipeline::Outcome& outcome) const;
   bool map_contradicted(const Pipeline::Outcome& outcome) const;

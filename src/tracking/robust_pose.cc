@@ -37,6 +37,9 @@ constexpr double kFractionOfOutliers = 1.0 / 3;  // minimum fraction of the outl
 
 // Minimum ratio of the support of another motion to that of the chosen one at which the choice is contested.
 constexpr double kContested = 0.5;
+// Minimum fraction of the smaller of the two numbers of landmarks that agree with one of two motions only, which are
+// matched by outnumbering landmarks of the other motion in the same camera.
+constexpr double kInSameCameras = 0.5;
 
 constexpr double kNew = 0.5;           // support of a new landmark
 constexpr double kTrustedAfter = 1.0;  // s, of observation by keyframes
@@ -90,8 +93,15 @@ class PoseChoice {
   const solver::PoseSolution& best() const { return candidates_[best_].solution; }
 
   ChosenPose chosen() && {
-    const bool contested = is_contested();
-    return {std::move(candidates_[best_].solution), contested};
+    ChosenPose out;
+    const double half = kContested * candidates_[best_].support.sum();
+    for (const Candidate& other : candidates_) {
+      if (!best().ok || !other.solution.ok || !same_cameras_observe(other.solution)) continue;
+      out.contested |= other.support.sum() > half;
+      out.undecided |= weighted_support(other).sum() > half;
+    }
+    out.solution = std::move(candidates_[best_].solution);
+    return out;
   }
 
  private:
@@ -116,20 +126,36 @@ class PoseChoice {
             scene_ ? kNew * scene_->agreeing_cells(solution.T_rig_world) : 0.0};
   }
 
-  bool clearly_better(const Candidate& other) const {
-    const Support& of_best = candidates_[best_].support;
+  Support weighted_support(const Candidate& other) const {
     Support weighted = other.support;
     weighted.scale(relative_extent(other.solution));
+    return weighted;
+  }
+
+  bool clearly_better(const Candidate& other) const {
+    const Support& of_best = candidates_[best_].support;
+    const Support weighted = weighted_support(other);
     return weighted.landmarks.sum() >= kComparable * of_best.landmarks.sum() &&
            weighted.sum() > kMoreSupport * of_best.sum();
   }
 
-  bool is_contested() const {
-    return best().ok && std::ranges::any_of(candidates_, [&](const Candidate& other) {
-             return other.solution.ok && other.support.sum() > kContested * candidates_[best_].support.sum() &&
-                    are_two_motions(exclusive(other.solution, best()).size(), other.solution,
-                                    exclusive(best(), other.solution).size());
-           });
+  // Whether another pose and the best one are those of two motions that the same cameras observe. If each agrees with
+  // other cameras, a camera is late or displaced.
+  bool same_cameras_observe(const solver::PoseSolution& other) const {
+    std::vector<std::size_t> of_other(matches_.size()), of_best(matches_.size());
+    for (std::size_t i = 0; i < observations_.size(); ++i) {
+      const std::size_t camera = observations_[i].camera.index();
+      of_other[camera] += other.inlier[i] && !best().inlier[i];
+      of_best[camera] += best().inlier[i] && !other.inlier[i];
+    }
+    std::size_t sum_other = 0, sum_best = 0, common = 0;
+    for (std::size_t c = 0; c < matches_.size(); ++c) {
+      sum_other += of_other[c];
+      sum_best += of_best[c];
+      common += std::min(of_other[c], of_best[c]);
+    }
+    return are_two_motions(sum_other, other, sum_best) &&
+           static_cast<double>(common) >= kInSameCameras * static_cast<double>(std::min(sum_other, sum_best));
   }
 
   // The factor by which the support of another pose counts more or less than that of the best one: the ratio of the
@@ -264,7 +290,7 @@ ChosenPose robust_pose(const TrackInput& input, const frame::BundledFrame& frame
                        const solver::MotionModel& motion, const solver::PoseSolverOptions& options) {
   const camera::Rig& rig = input.map.rig();
   solver::PoseSolution first = solver::solve_pose(rig, observations, predicted, motion, options);
-  if (!few(first, kFewInliers, observations.size())) return {std::move(first)};
+  if (!few(first, kFewInliers, observations.size())) return {.solution = std::move(first)};
   solver::PoseSolverOptions near_start = options;
   near_start.first_chi2 = kAgreesWithStart;
   const auto pose_near = [&](const geometry::SE3& start) {
@@ -292,7 +318,7 @@ ChosenPose sampled_pose(const TrackInput& input, const frame::BundledFrame& fram
                                    Random(input.seed, name, static_cast<std::uint64_t>(frame.id.value())));
   };
   solver::PoseSolution first = sample(observations, "wide search");
-  if (!few(first, kFewInliers, observations.size())) return {std::move(first)};
+  if (!few(first, kFewInliers, observations.size())) return {.solution = std::move(first)};
   solver::PoseSolverOptions near_start = options;
   near_start.first_chi2 = kAgreesWithStart;
   const auto of_outliers = first.ok ? sample(outliers(first, observations), "outliers") : solver::PoseSolution();

@@ -55,10 +55,11 @@ struct TrackResult {
   std::vector<CameraCounts> cameras;
   // Two motions had comparable support by the landmarks, of which one is that of moving objects.
   bool contested = false;
+  bool undecided = false;  // even the sizes of what moves do not tell which one (ChosenPose)
 };
 
-// Number of contested frames within this time from which on poses may be relative to moving objects. Single ones are
-// usual.
+// Number of contested or undecided frames within this time from which on poses may be relative to moving objects.
+// Single ones are usual.
 inline constexpr std::size_t kContestedFrames = 5;
 inline constexpr double kContestedWithin_s = 1.0;
 

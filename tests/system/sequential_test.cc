@@ -203,7 +203,7 @@ TEST_F(SystemContradictedMap, IsKeptAfterSeveralOthers) {
   for (int before = 0; before < 4; ++before) EXPECT_EQ(contradict(system, 8).map_withdrawn, before < 3) << before;
 }
 
-// All images are at rest but for their left half, which is displaced in every third frame.
+// All images are at rest but for two opposite quarters, which are displaced in every third frame.
 TEST(SystemSequential, DiscardsANewMapOfTwoMotions) {
   const RenderedTour tour(2, 16);
   Config config = small_config(execution::Mode::kSequential);
@@ -215,8 +215,10 @@ TEST(SystemSequential, DiscardsANewMapOfTwoMotions) {
     const image::ImageBundle& moved = tour.frames()[k % 3 == 2 ? 2 : 0];
     for (std::size_t c = 0; c < 2; ++c) {
       image::Image& image = frame.images[c].image;
-      for (int y = 0; y < image.height(); ++y)
-        std::copy_n(moved.images[c].image.row(y), image.width() / 2, image.row(y));
+      for (int y = 0; y < image.height(); ++y) {
+        const int half = image.width() / 2, begin = y < image.height() / 2 ? 0 : half;
+        std::copy_n(moved.images[c].image.row(y) + begin, half, image.row(y) + begin);
+      }
     }
     const FrameRecord record = must_process(system, frame);
     contested += record.result.contested;
