@@ -97,7 +97,7 @@ FrameResult to_frame_result(const tracking::FrameRecord& record, const camera::R
   out.unique_features = record.unique;
   out.matched_features = record.matched;
   out.keyframe = record.keyframe;
-  out.contested = result.contested;
+  out.contested = result.contest.contested;
   out.map_withdrawn = record.map_withdrawn;
   out.keyframe_id = result.anchored.reference.value();
   out.relocalised = record.relocalisation.has_value();

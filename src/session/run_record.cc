@@ -91,7 +91,7 @@ std::vector<ReducedInterval> reduced_intervals(const RunRecord& record) {
 std::vector<ContestedInterval> contested_intervals(const RunRecord& record) {
   std::vector<double> times_s;
   for (const RunFrame& frame : record.frames) {
-    if (frame.record && frame.record->final_result().contested) times_s.push_back(frame.time_s);
+    if (frame.record && frame.record->final_result().contest.contested) times_s.push_back(frame.time_s);
   }
   std::vector<ContestedInterval> intervals;
   std::size_t next = 0;  // the first frame that belongs to no interval yet

@@ -190,8 +190,8 @@ struct ReducedInterval {
 
 std::vector<ReducedInterval> reduced_intervals(const RunRecord& record);
 
-// An interval with many frames whose pose was contested (tracking::TrackResult, tracking::kContestedFrames), including
-// those of a map that was discarded for it.
+// An interval with many frames whose pose was contested (tracking::MotionContest, tracking::kContestedFrames),
+// including those of a map that was discarded for it.
 struct ContestedInterval {
   double from_s = 0.0, to_s = 0.0;
   std::int64_t frames = 0;  // those that were contested

@@ -208,11 +208,11 @@ bool System::scale_contradicted(const tracking::TrackResult& result) const {
 
 // Returns true if many poses up to this frame were undecided: those of a new map may be relative to a moving object.
 bool System::undecided(const tracking::TrackResult& result) const {
-  if (!result.undecided) return false;
+  if (!result.contest.undecided) return false;
   std::size_t frames = 1;
   for (const FrameRecord& before : std::views::reverse(frames_)) {
     if (to_seconds(result.time_ns - before.result.time_ns) > tracking::kContestedWithin_s) break;
-    frames += before.result.status == tracking::TrackStatus::kTracking && before.result.undecided;
+    frames += before.result.status == tracking::TrackStatus::kTracking && before.result.contest.undecided;
   }
   return frames >= tracking::kContestedFrames;
 }

@@ -37,8 +37,8 @@ constexpr double kFractionOfOutliers = 1.0 / 3;  // minimum fraction of the outl
 
 // Minimum ratio of the support of another motion to that of the chosen one at which the choice is contested.
 constexpr double kContested = 0.5;
-// Minimum fraction of the smaller of the two numbers of landmarks that agree with one of two motions only, which are
-// matched by outnumbering landmarks of the other motion in the same camera.
+// Of two motions that the same cameras observe: minimum number of landmarks that agree with one of them only and have
+// as many of the other in the same image, as a fraction of those of the rarer motion.
 constexpr double kInSameCameras = 0.5;
 
 constexpr double kNew = 0.5;           // support of a new landmark
@@ -97,8 +97,8 @@ class PoseChoice {
     const double half = kContested * candidates_[best_].support.sum();
     for (const Candidate& other : candidates_) {
       if (!best().ok || !other.solution.ok || !same_cameras_observe(other.solution)) continue;
-      out.contested |= other.support.sum() > half;
-      out.undecided |= weighted_support(other).sum() > half;
+      out.contest.contested |= other.support.sum() > half;
+      out.contest.undecided |= weighted_support(other).sum() > half;
     }
     out.solution = std::move(candidates_[best_].solution);
     return out;

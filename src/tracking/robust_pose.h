@@ -42,12 +42,7 @@ std::vector<std::uint8_t> agreeing_beyond_chance(const camera::Rig& rig,
 // A pose chosen among those of several motions.
 struct ChosenPose {
   solver::PoseSolution solution;
-  // Another pose has more than half of the support of this one, and many landmarks agree with either of them only: one
-  // is that of moving objects, and the choice may be wrong.
-  bool contested = false;
-  // The same if the supports are weighted by the extents of the two motions in space: even the sizes do not tell which
-  // is that of moving objects.
-  bool undecided = false;
+  MotionContest contest;
 };
 
 // As solver::solve_pose for the matches of a frame, in order; `predicted` is the initial pose. A robust kernel

@@ -23,7 +23,7 @@ struct Coarse {
   std::vector<std::uint8_t> excluded = {};  // per camera: excluded before or now
   // Per camera: landmarks of the last frame that were re-observed; empty if only the wide search succeeded.
   std::vector<LandmarkCounts> reobserved = {};
-  bool contested = false, undecided = false;  // see ChosenPose
+  MotionContest contest;
 };
 
 bool any(const std::vector<std::uint8_t>& flags) { return std::ranges::find(flags, std::uint8_t{1}) != flags.end(); }
@@ -57,8 +57,7 @@ bool track_in_narrow_windows(const TrackInput& input, const std::vector<Landmark
   auto observations = pose_observations(map, frame, found, input.features);
   if (count(found) < static_cast<std::size_t>(options.min_inliers)) return false;
   const solver::MotionModel motion = motion_model(input, frame);
-  auto [solution, contested, undecided] =
-      robust_pose(input, frame, found, observations, predicted, motion, options.pose);
+  auto [solution, contest] = robust_pose(input, frame, found, observations, predicted, motion, options.pose);
   const auto conflicting = [&](const solver::PoseSolution& pose, const auto& flags) {
     return flags(count_agreeing(found, pose.inlier, options.consensus), input.state.cameras, options.consensus);
   };
@@ -75,8 +74,7 @@ bool track_in_narrow_windows(const TrackInput& input, const std::vector<Landmark
     }
   }
   if (!supported(solution, observations.size(), options.min_inliers, options)) return false;
-  out.contested |= contested;
-  out.undecided |= undecided;
+  out.contest.add(contest);
   out.frame.twist = motion.twist(solution.T_rig_world);
   out.T_rig_world = solution.T_rig_world;
   out.matches = keep_inliers(found, solution.inlier);
@@ -104,7 +102,7 @@ bool track_in_wide_windows(const TrackInput& input, const std::vector<LandmarkId
   drop(out.excluded, search.found);
   if (count(search.found) < static_cast<std::size_t>(options.min_inliers_wide)) return false;
   const auto observations = pose_observations(map, frame, search.found, input.features);
-  const auto [solution, contested, undecided] =
+  const auto [solution, contest] =
       sampled_pose(input, frame, search.found, observations, out.T_rig_world, options.pose);
   out.reason = LostReason::kFewInliers;
   if (!solution.ok || solution.num_inliers < options.min_inliers_wide) return false;
@@ -115,8 +113,7 @@ bool track_in_wide_windows(const TrackInput& input, const std::vector<LandmarkId
     out = std::move(confirmed);
     return true;
   }
-  out.contested |= contested;
-  out.undecided |= undecided;
+  out.contest.add(contest);
   out.T_rig_world = solution.T_rig_world;
   out.matches = keep_inliers(search.found, solution.inlier);
   out.reason = LostReason::kNone;
@@ -181,7 +178,7 @@ struct Fine {
   std::vector<LandmarkId> visible;
   std::vector<LandmarkCounts> views;  // per camera: landmarks of the local view that are expected and found
   std::vector<LandmarkCounts> wide;   // the same with wide windows; empty unless an excluded camera is due for a retry
-  bool contested = false, undecided = false;  // see ChosenPose; also if they were in the coarse estimation
+  MotionContest contest;              // also that of the coarse estimation
 };
 
 // Per camera.
@@ -218,8 +215,8 @@ Fine track_local_view(const TrackInput& input, const Coarse& coarse, const Track
   auto chosen = robust_pose(input, frame, out.matches, pose_observations(map, out.matches, out.aligned),
                             coarse.T_rig_world, motion, options.pose);
   out.solution = std::move(chosen.solution);
-  out.contested = coarse.contested || chosen.contested;
-  out.undecided = coarse.undecided || chosen.undecided;
+  out.contest = coarse.contest;
+  out.contest.add(chosen.contest);
   out.twist = motion.twist(out.solution.T_rig_world);
   return out;
 }
@@ -291,7 +288,7 @@ void update_cameras(const Coarse& coarse, const Fine& fine, const ConsensusOptio
 TrackOutput tracked(const TrackInput& input, const Coarse& coarse, Fine&& fine, const TrackingOptions& options) {
   frame::BundledFrame refined = refined_frame(input.map.rig(), coarse, fine, options.initialisation);
   TrackOutput out = output_of(input, {std::move(refined), std::move(fine.solution), std::move(fine.matches),
-                                      std::move(fine.visible), fine.contested, fine.undecided});
+                                      std::move(fine.visible), fine.contest});
   update_cameras(coarse, fine, options.consensus, out);
   TrackerState& state = out.state;
   KeyframeEvidence evidence =

@@ -40,6 +40,21 @@ struct CameraCounts {
   bool excluded = false;         // its image is not consistent with the map (tracking/camera_consensus.h)
 };
 
+// Whether another pose of a frame was supported nearly as well, because something moves (tracking/robust_pose.h).
+struct MotionContest {
+  // It has more than half of the support, and many landmarks in the same images agree with either of the two only: one
+  // is that of moving objects, and the choice may be wrong.
+  bool contested = false;
+  // The same if the supports are weighted by the extents of the two motions in space: even the sizes do not tell which
+  // is that of moving objects.
+  bool undecided = false;
+
+  void add(const MotionContest& other) {
+    contested |= other.contested;
+    undecided |= other.undecided;
+  }
+};
+
 struct TrackResult {
   FrameId frame;
   TimeNs time_ns = 0;
@@ -53,9 +68,7 @@ struct TrackResult {
   // that initialised a map, or was located at the end of the run.
   std::optional<geometry::Matrix6d> covariance;
   std::vector<CameraCounts> cameras;
-  // Two motions had comparable support by the landmarks, of which one is that of moving objects.
-  bool contested = false;
-  bool undecided = false;  // even the sizes of what moves do not tell which one (ChosenPose)
+  MotionContest contest;
 };
 
 // Number of contested or undecided frames within this time from which on poses may be relative to moving objects.

@@ -191,15 +191,13 @@ DirectOutput track_directly(const TrackInput& input, frame::BundledFrame frame, 
   AlignedLandmarks found = align(input, frame, T_rig_world, local.candidates, input.alignment, pool);
   const auto observations = pose_observations(input.map, found.matches, found.aligned);
   const solver::MotionModel motion = motion_model(input, frame);
-  auto [solution, contested, undecided] =
-      robust_pose(input, frame, found.matches, observations, T_rig_world, motion, options.pose);
+  auto [solution, contest] = robust_pose(input, frame, found.matches, observations, T_rig_world, motion, options.pose);
   if (!enough(solution, observations.size(), options)) return {.failure = DirectFailure::kNoPose};
   const bool doubtful =
       newly_started(input, frame) && solution.num_inliers < kMinRatioAtStart * static_cast<double>(observations.size());
   frame.twist = motion.twist(solution.T_rig_world);
   frame = with_keypoints(std::move(frame), found);
-  TrackedFrame tracked{std::move(frame), std::move(solution), std::move(found.matches),
-                       local.expected,   contested,           undecided};
+  TrackedFrame tracked{std::move(frame), std::move(solution), std::move(found.matches), local.expected, contest};
   DirectOutput out = judged(input, local, std::move(tracked), options);
   if (doubtful) out.failure = DirectFailure::kDoubtful;
   // a search with features finds the others again

@@ -107,8 +107,7 @@ TrackOutput output_of(const TrackInput& input, TrackedFrame found) {
   result.status = TrackStatus::kTracking;
   result.reason = LostReason::kNone;
   result.T_rig_world = found.solution.T_rig_world;
-  result.contested = found.contested;
-  result.undecided = found.undecided;
+  result.contest = found.contest;
   result.cameras = camera_counts(frame, found.matches, out.matches);
   add_errors(map, frame, result.T_rig_world, out.matches, result.cameras);
   out.matched = std::move(found.matches);

@@ -20,9 +20,9 @@ bool supported(const solver::PoseSolution& solution, std::size_t num_matches, in
 struct TrackedFrame {
   frame::BundledFrame frame;  // see TrackOutput::frame
   solver::PoseSolution solution;
-  FrameMatches matches;                       // all, inliers and outliers
-  std::vector<LandmarkId> visible;            // landmarks that were searched for, each once
-  bool contested = false, undecided = false;  // see TrackResult
+  FrameMatches matches;             // all, inliers and outliers
+  std::vector<LandmarkId> visible;  // landmarks that were searched for, each once
+  MotionContest contest;
 };
 
 // The output for a frame with a pose. The states of its cameras and the decision on a keyframe are left to the caller.

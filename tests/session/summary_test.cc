@@ -144,7 +144,7 @@ TEST(LostIntervals, JoinConsecutiveLostFrames) {
 
 RunFrame contested(double time_s) {
   RunFrame out = frame(time_s);
-  out.record->result.contested = true;
+  out.record->result.contest.contested = true;
   return out;
 }
 

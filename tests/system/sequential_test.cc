@@ -221,7 +221,7 @@ TEST(SystemSequential, DiscardsANewMapOfTwoMotions) {
       }
     }
     const FrameRecord record = must_process(system, frame);
-    contested += record.result.contested;
+    contested += record.result.contest.contested;
     if (record.map_withdrawn) {
       EXPECT_GE(contested, tracking::kContestedFrames);
       EXPECT_EQ(tracked_frames(system), 0u);

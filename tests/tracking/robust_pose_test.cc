@@ -86,7 +86,7 @@ TEST_F(RobustPose, FollowsLandmarksThatManyKeyframesObserve) {
 
 TEST_F(RobustPose, IsContestedByAnotherMotionInTheSameImages) {
   const geometry::SE3 predicted = truth.perturbed((geometry::Vector6d() << 0, 1e-3, 0, 0.002, 0, 0.001).finished());
-  EXPECT_FALSE(chosen(predicted).contested);
+  EXPECT_FALSE(chosen(predicted).contest.contested);
   const std::vector<solver::PoseObservation> at_rest = observations;
   std::size_t i = 0;
   for (const auto& camera : matches) {
@@ -95,7 +95,7 @@ TEST_F(RobustPose, IsContestedByAnotherMotionInTheSameImages) {
     }
   }
   const ChosenPose of_two = chosen(predicted);
-  EXPECT_TRUE(of_two.contested && of_two.undecided);
+  EXPECT_TRUE(of_two.contest.contested && of_two.contest.undecided);
 
   observations = at_rest;
   Random random(1, "outliers", 0);
@@ -103,7 +103,7 @@ TEST_F(RobustPose, IsContestedByAnotherMotionInTheSameImages) {
     observations[k].pixel += 40 * Eigen::Vector2d(random.uniform() - 0.5, random.uniform() - 0.5);
   const ChosenPose scattered = chosen(predicted);
   EXPECT_LT(error(scattered.solution), 0.005);
-  EXPECT_FALSE(scattered.contested || scattered.undecided);
+  EXPECT_FALSE(scattered.contest.contested || scattered.contest.undecided);
 }
 
 // All landmarks of camera 0 are at rest, all others move.
@@ -117,7 +117,7 @@ TEST_F(RobustPose, IsNotContestedByAnotherMotionInOtherImages) {
   const ChosenPose late = chosen(truth);
   ASSERT_TRUE(late.solution.ok);
   EXPECT_LT(late.solution.num_inliers, 0.8 * static_cast<double>(observations.size()));
-  EXPECT_FALSE(late.contested || late.undecided);
+  EXPECT_FALSE(late.contest.contested || late.contest.undecided);
 }
 
 TEST_F(RobustPose, FollowsTheMajorityIfThePredictionIsWrong) {
