@@ -63,10 +63,13 @@ function(bslam_test name)
   endif()
 endfunction()
 
-# Flags of our own code: warnings are errors, results do not depend on contraction of multiply and add.
+# Flags of our own code: results do not depend on contraction of multiply and add.
 add_library(bslam_flags INTERFACE)
 target_compile_options(bslam_flags INTERFACE -Wall -Wextra -Wshadow -Wnon-virtual-dtor -Wconversion -Wno-sign-conversion
-                                             -Werror -ffp-contract=off)
+                                             -ffp-contract=off)
+if(BSLAM_WARNINGS_AS_ERRORS)
+  target_compile_options(bslam_flags INTERFACE -Werror)
+endif()
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
   # Every x86-64 processor since 2009 counts bits in one instruction; without it descriptor distances cost several times
   # as much. Nothing newer is assumed, so that the binary runs anywhere and Eigen's alignment is that of other programs.

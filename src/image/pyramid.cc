@@ -7,8 +7,8 @@
 #include <cstring>
 #include <memory>
 
-#if defined(__SSE2__)
-#include <emmintrin.h>
+#if defined(__SSSE3__)
+#include <tmmintrin.h>
 #endif
 
 #include "base/assert.h"
@@ -23,6 +23,7 @@ constexpr int kTaps = 4;  // enough for a triangle filter of half-width 2, that 
 constexpr int kStrip = 512;
 constexpr int kRowWeightSum = 1 << 8;      // sum of the vertical weights; a weighted sum of bytes fits into 16 bits
 constexpr int kColumnWeightSum = 1 << 14;  // sum of the horizontal weights
+constexpr int kSampleBytes = kTaps * static_cast<int>(sizeof(std::int16_t));  // of the samples of one output
 constexpr int kShift = 21;  // fixed-point bits of both passes: 8 + 14, minus 1 that is dropped between them
 
 }  // namespace
@@ -38,6 +39,9 @@ struct Resampling {
     int input_begin = 0, input_count = 0, outputs = 0;
     std::array<std::int32_t, kStrip> first;
     alignas(16) std::array<std::int16_t, kStrip * kTaps> weight;
+    // Positions, in the 16 bytes from the first sample of an even column, of the bytes of its samples and of those of
+    // the next column.
+    alignas(16) std::array<std::uint8_t, kStrip * kSampleBytes> byte;
   };
 
   int in_width = 0, in_height = 0, out_width = 0, out_height = 0;  // pixels
@@ -86,6 +90,10 @@ void make_strip(int begin, int end, int inputs, int outputs, Strip& strip) {
     for (int k = 0; k < kTaps; ++k) strip.weight[(i - begin) * kTaps + k] = static_cast<std::int16_t>(taps.weight[k]);
     strip.input_count = taps.first + kTaps - strip.input_begin;
   }
+  for (int i = 0; i < strip.outputs * kSampleBytes; ++i) {
+    const int column = i / kSampleBytes;
+    strip.byte[i] = static_cast<std::uint8_t>(2 * (strip.first[column] - strip.first[column & ~1]) + i % kSampleBytes);
+  }
 }
 
 std::shared_ptr<const Resampling> make_resampling(const Image& in, const Image& out) {
@@ -111,14 +119,12 @@ BSLAM_VECTORISED void blend_rows(const std::array<const std::uint8_t*, kTaps>& r
 // Horizontal pass: from `in` (15 bits) to grey values.
 BSLAM_VECTORISED void blend_columns(const Strip& strip, const std::int16_t* in, std::uint8_t* out) {
   int i = 0;
-#if defined(__SSE2__)
+#if defined(__SSSE3__)
   const __m128i half = _mm_set1_epi32(1 << (kShift - 1));
-  const auto samples = [&](int k) { return reinterpret_cast<const double*>(in + strip.first[k]); };
+  const auto load = [](const auto* at) { return _mm_loadu_si128(reinterpret_cast<const __m128i*>(at)); };
   const auto pair = [&](int k) {  // two output pixels, each as two partial sums
-    const __m128d low = _mm_loadl_pd(_mm_setzero_pd(), samples(k));
-    const __m128i both = _mm_castpd_si128(_mm_loadh_pd(low, samples(k + 1)));
-    return _mm_castsi128_ps(
-        _mm_madd_epi16(both, _mm_load_si128(reinterpret_cast<const __m128i*>(strip.weight.data() + k * kTaps))));
+    const __m128i samples = _mm_shuffle_epi8(load(in + strip.first[k]), load(strip.byte.data() + k * kSampleBytes));
+    return _mm_castsi128_ps(_mm_madd_epi16(samples, load(strip.weight.data() + k * kTaps)));
   };
   for (; i + 4 <= strip.outputs; i += 4) {
     const __m128 a = pair(i), b = pair(i + 2);
@@ -139,10 +145,12 @@ BSLAM_VECTORISED void blend_columns(const Strip& strip, const std::int16_t* in, 
 
 void shrink(const Image& in, const Resampling& plan, Image& out) {
   // A strip covers at most kStrip * ratio input columns. The ratio may slightly exceed 2 because sizes are rounded.
-  alignas(16) std::array<std::int16_t, kStrip * 9 / 4 + kTaps> row;
+  // Eight samples are read at the last pair of columns.
+  alignas(16) std::array<std::int16_t, kStrip * 9 / 4 + 2 * kTaps> row;
   int begin = 0;
   for (const Strip& strip : plan.strips) {
-    BSLAM_ASSERT(strip.input_count <= static_cast<int>(row.size()), "the ratio of pyramid levels must be at most 2");
+    BSLAM_ASSERT(strip.input_count + kTaps <= static_cast<int>(row.size()),
+                 "the ratio of pyramid levels must be at most 2");
     for (int y = 0; y < out.height(); ++y) {
       const Taps& taps = plan.rows[y];
       std::array<const std::uint8_t*, kTaps> rows;

@@ -42,7 +42,7 @@ std::vector<std::uint8_t> agreeing_beyond_chance(const camera::Rig& rig,
 // A pose chosen among those of several motions.
 struct ChosenPose {
   solver::PoseSolution solution;
-  MotionContest contest;
+  MotionContest contest{};
 };
 
 // As solver::solve_pose for the matches of a frame, in order; `predicted` is the initial pose. A robust kernel

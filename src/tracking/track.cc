@@ -23,7 +23,7 @@ struct Coarse {
   std::vector<std::uint8_t> excluded = {};  // per camera: excluded before or now
   // Per camera: landmarks of the last frame that were re-observed; empty if only the wide search succeeded.
   std::vector<LandmarkCounts> reobserved = {};
-  MotionContest contest;
+  MotionContest contest{};
 };
 
 bool any(const std::vector<std::uint8_t>& flags) { return std::ranges::find(flags, std::uint8_t{1}) != flags.end(); }
@@ -178,7 +178,7 @@ struct Fine {
   std::vector<LandmarkId> visible;
   std::vector<LandmarkCounts> views;  // per camera: landmarks of the local view that are expected and found
   std::vector<LandmarkCounts> wide;   // the same with wide windows; empty unless an excluded camera is due for a retry
-  MotionContest contest;              // also that of the coarse estimation
+  MotionContest contest{};            // also that of the coarse estimation
 };
 
 // Per camera.

@@ -68,7 +68,7 @@ struct TrackResult {
   // that initialised a map, or was located at the end of the run.
   std::optional<geometry::Matrix6d> covariance;
   std::vector<CameraCounts> cameras;
-  MotionContest contest;
+  MotionContest contest{};
 };
 
 // Number of contested or undecided frames within this time from which on poses may be relative to moving objects.
