@@ -33,7 +33,8 @@ if(BSLAM_PRECOMPILED)
   if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
     add_compile_options(-fpch-preprocess)  # so that ccache sees what a file includes
     # GCC 12 warns of errors within std::string that are none if its header is precompiled.
-    target_compile_options(bslam_flags INTERFACE -Wno-restrict -Wno-array-bounds)
+    target_compile_options(bslam_flags INTERFACE -Wno-restrict -Wno-array-bounds -Wno-stringop-overread
+                                                 -Wno-stringop-overflow)
   endif()
   bslam_precompile(bslam_precompiled LINKS bslam_flags)
   set_target_properties(bslam_precompiled PROPERTIES POSITION_INDEPENDENT_CODE ON CXX_VISIBILITY_PRESET hidden
