@@ -6,12 +6,12 @@ namespace bslam::adjustment {
 namespace {
 
 // Returns the index of the fixed keyframe with the most observations among those of the submap whose root is `root`,
-// the older one on ties; -1 if there is none.
-int anchor_pose(const map::BundledMap& map, const BundleProblem& flat, std::span<const int> observations,
+// the older one on ties; -1 if there is none. `root_of_each`: that of the map.
+int anchor_pose(std::span<const KeyframeId> root_of_each, const BundleProblem& flat, std::span<const int> observations,
                 KeyframeId root) {
   int anchor = -1;
   for (std::size_t i = 0; i < flat.keyframes.size(); ++i) {
-    if (flat.problem.pose_free[i] || map.root_of(flat.keyframes[i]) != root) continue;
+    if (flat.problem.pose_free[i] || root_of_each[flat.keyframes[i].index()] != root) continue;
     if (anchor < 0 || observations[i] > observations[static_cast<std::size_t>(anchor)]) anchor = static_cast<int>(i);
   }
   return anchor;
@@ -43,6 +43,7 @@ std::vector<geometry::PoseUncertainty::Effect> fixed_effects(const map::BundledM
                                                              Eigen::Index columns) {
   using Effect = geometry::PoseUncertainty::Effect;
   const std::vector<int> observations = observations_of_poses(flat);
+  const std::vector<KeyframeId> root = map.root_of_each();
   const auto effect = [&](std::size_t pose) {
     const Effect& own = map.keyframe(flat.keyframes[pose]).uncertainty.calibration;
     return own.cols() == columns ? own : Effect(Effect::Zero(6, columns));
@@ -52,7 +53,7 @@ std::vector<geometry::PoseUncertainty::Effect> fixed_effects(const map::BundledM
   for (std::size_t i = 0; i < out.size(); ++i) {
     if (flat.problem.pose_free[i]) continue;
     out[i] = Effect::Zero(6, columns);
-    const int anchor = anchor_pose(map, flat, observations, map.root_of(flat.keyframes[i]));
+    const int anchor = anchor_pose(root, flat, observations, root[flat.keyframes[i].index()]);
     if (anchor == static_cast<int>(i)) continue;
     out[i] = effect(i) - relative_pose(flat, i, anchor).adjoint() * effect(static_cast<std::size_t>(anchor));
     any |= !out[i].isZero(0);
@@ -67,10 +68,11 @@ PoseUncertainties pose_uncertainties(const map::BundledMap& map, const BundlePro
   constexpr double kTruncation = solver::kFractionLeft / solver::kVarianceLeft;
   const double factor = correlated_observations * kTruncation * kTruncation;
   const std::vector<int> observations = observations_of_poses(flat);
+  const std::vector<KeyframeId> root = map.root_of_each();
   PoseUncertainties out;
   for (std::size_t i = 0; i < marginals.size(); ++i) {
     const KeyframeId k = flat.keyframes[static_cast<std::size_t>(poses[i])];
-    const int anchor = anchor_pose(map, flat, observations, map.root_of(k));
+    const int anchor = anchor_pose(root, flat, observations, root[k.index()]);
     if (!marginals[i] || anchor < 0) continue;
     const geometry::SE3 T_k_anchor = relative_pose(flat, static_cast<std::size_t>(poses[i]), anchor);
     const geometry::PoseUncertainty of_adjustment{factor * marginals[i]->noise, marginals[i]->calibration};

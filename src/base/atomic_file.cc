@@ -96,4 +96,10 @@ Result<std::string> read_file(const std::filesystem::path& path, std::size_t max
   return bytes;
 }
 
+Result<std::string> read_text(const std::filesystem::path& path, std::size_t max_bytes) {
+  auto text = read_file(path, max_bytes);
+  if (text && text->starts_with("\xEF\xBB\xBF")) text->erase(0, 3);
+  return text;
+}
+
 }  // namespace bslam

@@ -26,5 +26,7 @@ Status check_writable(const std::filesystem::path& path);
 // Returns the contents of a regular file. Errors: the file cannot be opened or read, is not a regular file, or is
 // larger than `max_bytes`.
 Result<std::string> read_file(const std::filesystem::path& path, std::size_t max_bytes);
+// The same for a text in UTF-8, without the byte order mark that some editors write.
+Result<std::string> read_text(const std::filesystem::path& path, std::size_t max_bytes);
 
 }  // namespace bslam

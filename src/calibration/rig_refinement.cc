@@ -349,8 +349,9 @@ void move_submap(KeyframeId keyframe, const geometry::SE3& T_rig_world, map::Map
     poses.uncertainties.emplace_back(
         k, map.keyframe(k).uncertainty + geometry::transported(added, T_k_world * before.T_rig_world.inverse()));
   }
+  const std::vector<KeyframeId> root_of_each = map.root_of_each();
   for (const LandmarkId l : map.landmark_ids()) {
-    if (map.root_of(map.landmark(l).reference.keyframe) == root)
+    if (root_of_each[map.landmark(l).reference.keyframe.index()] == root)
       poses.landmarks.emplace_back(l, T_new_old * map.landmark(l).position);
   }
   draft.set_poses(std::move(poses));

@@ -15,6 +15,8 @@
 namespace bslam::cli {
 namespace {
 
+constexpr std::string_view kEmptyValue = "empty value";
+
 // Returns the innermost command that was recognised: for `bslam map info`, this is `info`.
 const CLI::App& chosen(const CLI::App& app) {
   const auto verbs = app.get_subcommands();
@@ -104,6 +106,8 @@ std::optional<Error> value_error(const CLI::App& verb, const std::string& text) 
     return option_error(pair->before, "no " + pair->behind, pair->behind + " as well");
   const auto parts = parted(text, ": ");
   if (!parts) return std::nullopt;
+  if (parts->behind == kEmptyValue)
+    return option_error(parts->before, "an empty value", kind_of_value(verb, parts->before));
   if (text.find(" required ") != std::string::npos && text.ends_with(" missing"))
     return option_error(parts->before, "no value after it", kind_of_value(verb, parts->before));
   if (const auto set = parted(parts->behind, " not in {"); set && set->behind.ends_with('}')) {
@@ -118,6 +122,17 @@ std::optional<Error> value_error(const CLI::App& verb, const std::string& text) 
 }
 
 }  // namespace
+
+void refuse_empty_values(CLI::App& app) {
+  app.parse_complete_callback([&app] {
+    for (const CLI::Option* option : app.get_options()) {
+      const bool may_lack_value = option->get_items_expected_min() == 0;
+      if (!may_lack_value && std::ranges::any_of(option->results(), &std::string::empty))
+        throw CLI::ValidationError(option->get_name(), std::string(kEmptyValue));
+    }
+  });
+  for (CLI::App* verb : app.get_subcommands([](const CLI::App*) { return true; })) refuse_empty_values(*verb);
+}
 
 Error command_line_error(const CLI::App& app, const CLI::ParseError& error) {
   const CLI::App& verb = chosen(app);

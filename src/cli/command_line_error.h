@@ -7,6 +7,10 @@
 
 namespace bslam::cli {
 
+// Makes empty values of options and arguments errors, in this command and those below it. They come from variables of a
+// shell that are not set, and would count as options that were not given.
+void refuse_empty_values(CLI::App& app);
+
 // Names the first unknown command or option, and suggests an existing one if its name is close. Other errors are
 // reported with the message of the parser.
 Error command_line_error(const CLI::App& app, const CLI::ParseError& error);

@@ -35,6 +35,7 @@ int main(int argc, char** argv) {
   add_serve(app, exit_status);
   add_fleet(app, exit_status);
   add_settings(app, exit_status);
+  refuse_empty_values(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

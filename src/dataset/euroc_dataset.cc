@@ -7,6 +7,7 @@
 
 #include "base/atomic_file.h"
 #include "base/number_text.h"
+#include "dataset/listed_images.h"
 #include "dataset/recording.h"
 #include "rig_formats/euroc_sensor.h"
 
@@ -67,12 +68,12 @@ class EurocRecording : public Recording {
 
   Result<image_files::ImageList> images(std::size_t camera) const override {
     const fs::path file = folders_[camera] / "data.csv";
-    const auto text = read_file(file, kMaxListBytes);
+    const auto text = read_text(file, kMaxListBytes);
     if (!text) return text.error();
     auto images = parse_list(file, *text, folders_[camera] / "data");
     if (!images) return images.error();
     if (images->empty()) return Error{file.string(), "", "no images", "one line timestamp,filename per image"};
-    return image_files::in_time_order(*std::move(images), file.string());
+    return listed_images(*std::move(images), file, folders_[camera] / "data", image_files::StampUnit::kOfFile);
   }
 
   std::optional<fs::path> ground_truth() const override {
@@ -95,9 +96,13 @@ bool partly_written(const fs::path& folder) {
 
 }  // namespace
 
+// A folder camN that holds its images beside data.csv is not EuRoC's.
 bool looks_like_euroc(const fs::path& folder) {
   std::error_code error;
-  return fs::is_directory(folder / "mav0", error) || !rig_formats::camera_folders(folder, "data.csv").empty();
+  return fs::is_directory(folder / "mav0", error) ||
+         std::ranges::any_of(rig_formats::camera_folders(folder, "data.csv"), [&](const fs::path& camera) {
+           return fs::is_directory(camera / "data", error) || fs::exists(camera / "sensor.yaml", error);
+         });
 }
 
 RecordingResult open_euroc(const fs::path& folder) {

@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <set>
 #include <utility>
 
 #include "dataset/camera_folders.h"
 #include "dataset/image_names.h"
+#include "dataset/listed_images.h"
 #include "dataset/recording.h"
 #include "dataset/time_list.h"
 #include "rig_formats/euroc_sensor.h"
@@ -69,30 +69,20 @@ bool may_be_in(const CameraFolder& camera, const fs::path& name) {
 }
 
 // Times of images that the list names. One list may name those of several folders.
-Result<CameraImages> with_named_times(const TimeList& list, const std::vector<fs::path>& files,
-                                      const CameraFolder& camera) {
+Result<CameraImages> with_named_times(const TimeList& list, const CameraFolder& camera) {
   const fs::path& folder = camera.images;
-  std::set<std::string> unlisted;
-  for (const fs::path& file : files) unlisted.insert(file.filename().string());
   std::vector<image_files::ImageFile> images;
   for (std::size_t k = 0; k < list.names.size(); ++k) {
     const fs::path name = list.names[k];
     if (!may_be_in(camera, name)) continue;
-    unlisted.erase(name.filename().string());
     images.push_back({folder / name.filename(), list.times_ns[k]});
   }
   if (images.empty()) {
     return Error{list.file.string(), "", "no image of " + folder.string(),
                  "lines of TIME FILENAME for the images in it"};
   }
-  CameraImages out{.list = image_files::in_time_order(std::move(images), list.file.string(), unit_of(list)),
-                   .times_from = list.file.filename().string()};
-  if (!unlisted.empty()) {
-    out.list.warnings.push_back(fmt::format("{}: {} of {} images in {} are not listed and are not used, the first: {}",
-                                            list.file.string(), unlisted.size(), files.size(), folder.string(),
-                                            *unlisted.begin()));
-  }
-  return out;
+  return CameraImages{.list = listed_images(std::move(images), list.file, folder, unit_of(list)),
+                      .times_from = list.file.filename().string()};
 }
 
 // Images whose numbers are multiplied by the interval of a rate. A list of times is not used then.
@@ -128,8 +118,8 @@ Result<CameraImages> read_camera(const CameraFolder& camera, const fs::path& dat
   const auto list = read_time_list(**file, stamps.unit_ns.has_value());
   if (!list) return list.error();
   if (list->names.empty() && !named) return named.error();
-  auto out = list->names.empty() ? with_times(*list, *std::move(named), camera.images)
-                                 : with_named_times(*list, files, camera);
+  auto out =
+      list->names.empty() ? with_times(*list, *std::move(named), camera.images) : with_named_times(*list, camera);
   if (out) out->unit_is_known = !stamps.unit_ns;
   return out;
 }

@@ -7,7 +7,9 @@
 
 #include "base/atomic_file.h"
 #include "dataset/recording.h"
+#include "dataset/time_stamps.h"
 #include "evaluation/trajectory_file.h"
+#include "image/frame_grouping.h"
 #include "rig_formats/kitti_calib.h"
 
 namespace bslam::dataset {
@@ -19,7 +21,7 @@ constexpr std::size_t kMaxListBytes = std::size_t{1} << 28;
 constexpr int kCameras = 4;
 
 Result<std::vector<TimeNs>> read_times(const fs::path& file) {
-  const auto text = read_file(file, kMaxListBytes);
+  const auto text = read_text(file, kMaxListBytes);
   if (!text) return text.error();
   std::vector<TimeNs> times;
   std::istringstream lines(*text);
@@ -35,6 +37,11 @@ Result<std::vector<TimeNs>> read_times(const fs::path& file) {
     times.push_back(*time);
   }
   if (times.empty()) return Error{file.string(), "", "no times", "the time of every image in seconds, one per line"};
+  if (times.size() < 2) return times;
+  if (const TimeNs interval_ns = image::median_interval(times);
+      interval_ns < kShortestInterval || interval_ns > kLongestInterval)
+    return Error{file.string(), "", fmt::format("times {:g} s apart", to_seconds(interval_ns)),
+                 "the time of every image in seconds"};
   return times;
 }
 

@@ -11,6 +11,7 @@
 
 #include "base/atomic_file.h"
 #include "base/number_text.h"
+#include "dataset/listed_images.h"
 #include "dataset/recording.h"
 #include "rig_formats/rig_file.h"
 
@@ -86,15 +87,15 @@ class KittiRawRecording : public Recording {
 
   Result<image_files::ImageList> images(std::size_t camera) const override {
     const fs::path folder = root_ / folder_name(cameras_[camera]), file = folder / "timestamps.txt";
-    const auto text = read_file(file, kMaxListBytes);
+    const auto text = read_text(file, kMaxListBytes);
     if (!text) return text.error();
     std::vector<image_files::ImageFile> images;
     std::istringstream lines(*text);
-    for (std::string line; std::getline(lines, line);) {
+    std::size_t number = 0;  // of the image and of the lines before this one
+    for (std::string line; std::getline(lines, line); ++number) {
       line.erase(line.find_last_not_of(" \r\t") + 1);
-      const std::size_t number = images.size();
+      if (line.empty()) continue;  // an image without a time
       const auto time = parse_date(line);
-      if (!time && line.empty()) continue;
       if (!time) {
         return Error{file.string(), fmt::format("line {}", number + 1), line.substr(0, 60),
                      "a date such as 2011-09-26 13:02:25.964389445"};
@@ -102,7 +103,7 @@ class KittiRawRecording : public Recording {
       images.push_back({folder / "data" / fmt::format("{:010}.png", number), *time});
     }
     if (images.empty()) return Error{file.string(), "", "no times", "the date of every image"};
-    return image_files::in_time_order(std::move(images), file.string(), image_files::StampUnit::kSeconds);
+    return listed_images(std::move(images), file, folder / "data", image_files::StampUnit::kSeconds);
   }
 
  private:

@@ -156,8 +156,10 @@ RecordingDescription Recording::describe() const {
     StreamDescription stream{.name = "", .type = "images", .encoding = ""};
     const auto list = images(c);
     if (!list) {
-      if (const std::vector<std::string> names = folder_names(); c < names.size()) stream.name = names[c];
+      const std::vector<std::string> names = folder_names();
+      stream.name = c < names.size() ? names[c] : fmt::format("camera {}", c);
       stream.unused = list.error().message();
+      out.missing.push_back(stream.unused);
       out.streams.push_back(std::move(stream));
       continue;
     }

@@ -43,7 +43,7 @@ Result<std::vector<std::string>> listed_files(const fs::path& metadata) {
   if (!bag) return bag.error();
   const YAML::Node list = bag->node()["relative_file_paths"];
   std::vector<std::string> names;
-  for (std::size_t k = 0; list.IsSequence() && k < list.size(); ++k) {
+  for (std::size_t k = 0; list.IsDefined() && list.IsSequence() && k < list.size(); ++k) {
     if (list[k].IsScalar() && !list[k].Scalar().empty()) names.push_back(list[k].Scalar());
   }
   if (names.empty()) return bag->error("relative_file_paths", "no file", "the files of the bag");

@@ -47,7 +47,7 @@ Error line_error(const fs::path& file, const Line& line) {
 }
 
 Result<std::vector<Line>> read_lines(const fs::path& file) {
-  const auto text = read_file(file, kMaxListBytes);
+  const auto text = read_text(file, kMaxListBytes);
   if (!text) return text.error();
   std::vector<Line> lines;
   std::istringstream stream(*text);

@@ -16,6 +16,19 @@
 #include "session/report_data.h"
 
 namespace bslam::live_view {
+
+enum class Phase { kFeeding, kFinishing, kEnded };
+
+// The data that the run passes to the view.
+struct Mailbox {
+  std::vector<FedFrame> frames;                         // all frames since the view last read them
+  std::shared_ptr<const session::ProcessedFrame> last;  // the newest processed frame
+  std::optional<StageResults> results;
+  Phase phase = Phase::kFeeding;
+  std::size_t fed = 0;  // frames
+  std::string report;   // data of the report, once the run has ended
+};
+
 namespace {
 
 using nlohmann::ordered_json;
@@ -27,8 +40,6 @@ std::vector<web_server::Channel> channels() {
   return {{"state", milliseconds(100), true}, {"frame", milliseconds(100)}, {"run", milliseconds(1000)}};
 }
 
-enum class Phase { kFeeding, kFinishing, kEnded };
-
 std::string_view name_of(Phase phase) {
   constexpr std::array<std::string_view, 3> kNames = {"feeding", "finishing", "ended"};
   return kNames[static_cast<std::size_t>(phase)];
@@ -37,16 +48,6 @@ std::string_view name_of(Phase phase) {
 std::string text_of(const ordered_json& json) {
   return json.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
 }
-
-// The data that the run passes to the view.
-struct Mailbox {
-  std::vector<FedFrame> frames;                         // all frames since the view last read them
-  std::shared_ptr<const session::ProcessedFrame> last;  // the newest processed frame
-  std::optional<StageResults> results;
-  Phase phase = Phase::kFeeding;
-  std::size_t fed = 0;  // frames
-  std::string report;   // data of the report, once the run has ended
-};
 
 }  // namespace
 

@@ -13,8 +13,9 @@ int EssentialGraph::vertex(KeyframeId k) const {
 
 EssentialGraph essential_graph(const map::BundledMap& map, KeyframeId root, int edge_weight) {
   EssentialGraph graph;
+  const std::vector<KeyframeId> root_of_each = map.root_of_each();
   for (const KeyframeId k : map.keyframe_ids()) {
-    if (map.root_of(k) == root) graph.keyframes.push_back(k);
+    if (root_of_each[k.index()] == root) graph.keyframes.push_back(k);
   }
   graph.problem.free_scale = map.scale() != map::Scale::kMetric;
   for (const KeyframeId k : graph.keyframes) {

@@ -26,11 +26,11 @@ bool was_away(const map::BundledMap& map, KeyframeId earlier, KeyframeId later, 
               const RecognitionOptions& options) {
   auto neighbours = neighbours_of(map, earlier, options);
   std::erase_if(neighbours, [&](const map::Covisible& c) { return c.weight < kInSight * weight; });
-  const KeyframeId root = map.root_of(earlier);
+  const std::vector<KeyframeId> root = map.root_of_each();
   int away = 0;
   for (std::size_t i = earlier.index() + 1; i < later.index() && away < kAway; ++i) {
     const KeyframeId k(i);
-    if (!map.alive(k) || map.root_of(k) != root) continue;
+    if (!map.alive(k) || root[i] != root[earlier.index()]) continue;
     away = std::ranges::binary_search(neighbours, k, {}, &map::Covisible::keyframe) ? 0 : away + 1;
   }
   return away == kAway;

@@ -53,12 +53,12 @@ double relative_distance(const map::BundledMap& map, const PlaceMatch& place_mat
 
 // Length of the path between two keyframes through all keyframes of their submap created in between.
 double path_length(const map::BundledMap& map, KeyframeId from, KeyframeId to) {
-  const KeyframeId root = map.root_of(to);
+  const std::vector<KeyframeId> root = map.root_of_each();
   double length = 0;
   Vector3d last = centre(map.keyframe(from).T_rig_world);
   for (std::size_t i = from.index() + 1; i <= to.index(); ++i) {
     const KeyframeId k(i);
-    if (!map.alive(k) || map.root_of(k) != root) continue;
+    if (!map.alive(k) || root[i] != root[to.index()]) continue;
     const Vector3d next = centre(map.keyframe(k).T_rig_world);
     length += (next - last).norm();
     last = next;
@@ -221,14 +221,15 @@ bool merge_submaps(const LoopClosure& closure, const PlaceMatch& place_match, co
 
   map::SetPoses poses;
   poses.correction = true;
+  const std::vector<KeyframeId> root = map.root_of_each();
   for (const KeyframeId k : map.keyframe_ids()) {
-    if (map.root_of(k) == moving) poses.keyframes.emplace_back(k, map.keyframe(k).T_rig_world * motion.inverse());
+    if (root[k.index()] == moving) poses.keyframes.emplace_back(k, map.keyframe(k).T_rig_world * motion.inverse());
   }
   const KeyframeId from = here_moves ? closure.keyframe : closure.matched_keyframe;
   const KeyframeId to = here_moves ? closure.matched_keyframe : closure.keyframe;
   move_uncertainties(map, from, to, motion, poses);
   for (const LandmarkId l : map.landmark_ids()) {
-    if (map.root_of(map.landmark(l).reference.keyframe) == moving)
+    if (root[map.landmark(l).reference.keyframe.index()] == moving)
       poses.landmarks.emplace_back(l, motion * map.landmark(l).position);
   }
   const std::vector<KeyframeId> window = window_of(map, closure.keyframe, options.window);

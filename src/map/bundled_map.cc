@@ -66,6 +66,19 @@ KeyframeId BundledMap::root_of(KeyframeId k) const {
   return k;
 }
 
+std::vector<KeyframeId> BundledMap::root_of_each() const {
+  std::vector<KeyframeId> out(keyframes_.size());
+  std::vector<KeyframeId> path;  // from a keyframe to one whose root is known
+  for (std::size_t i = 0; i < keyframes_.size(); ++i) {
+    KeyframeId k(i);
+    for (path.clear(); !out[k.index()].valid() && keyframe(k).parent.valid(); k = keyframe(k).parent) path.push_back(k);
+    const KeyframeId root = out[k.index()].valid() ? out[k.index()] : k;
+    out[k.index()] = root;
+    for (const KeyframeId passed : path) out[passed.index()] = root;
+  }
+  return out;
+}
+
 KeyframeId BundledMap::nearest_alive_ancestor(KeyframeId k) const {
   while (k.valid() && !keyframe(k).alive) k = keyframe(k).parent;
   return k;

@@ -113,6 +113,8 @@ class BundledMap {
   // Roots of all submaps in ascending order, and the root of the submap of an alive keyframe.
   std::vector<KeyframeId> roots() const;
   KeyframeId root_of(KeyframeId k) const;
+  // The root of each keyframe slot. Takes as long as root_of() for a few keyframes of a long path.
+  std::vector<KeyframeId> root_of_each() const;
   // Alive keyframes of the submap with this root, parents before children.
   std::vector<KeyframeId> keyframes_of_submap(KeyframeId root) const;
   // Returns the keyframe itself if it is alive, otherwise its nearest alive ancestor; invalid if its submap was

@@ -20,6 +20,8 @@ void MapStore::restart() {
   BundledMap emptied = *snapshot();
   for (const KeyframeId root : emptied.roots()) emptied.remove_submap(root);
   emptied.free_removed(emptied.landmark_slots());
+  if (emptied.rig_deviation())  // estimated from the map that was wrong
+    emptied.set_rig(std::make_shared<const camera::Rig>(emptied.given_rig()), nullptr);
   emptied.set_scale(Scale::kMetric);  // the initial value of a new map
   emptied.set_version(emptied.version().next());
   auto fresh = std::make_shared<const BundledMap>(std::move(emptied));

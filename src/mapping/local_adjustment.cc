@@ -52,12 +52,13 @@ std::size_t num_fixed_poses(const map::BundledMap& map) { return map.scale() == 
 // Fixes the oldest free keyframes of each submap until enough of its poses are fixed, but not all keyframes; sorts both
 // lists.
 void fix_gauge(const map::BundledMap& map, adjustment::Selection& selection) {
+  const std::vector<KeyframeId> root = map.root_of_each();
   std::map<KeyframeId, std::size_t> num_fixed;  // by root
-  for (const KeyframeId k : selection.fixed_keyframes) ++num_fixed[map.root_of(k)];
+  for (const KeyframeId k : selection.fixed_keyframes) ++num_fixed[root[k.index()]];
   std::sort(selection.free_keyframes.begin(), selection.free_keyframes.end());
   std::size_t num_free = selection.free_keyframes.size();
   std::erase_if(selection.free_keyframes, [&](KeyframeId k) {
-    std::size_t& fixed = num_fixed[map.root_of(k)];
+    std::size_t& fixed = num_fixed[root[k.index()]];
     if (fixed >= num_fixed_poses(map) || num_free <= 1) return false;
     ++fixed;
     --num_free;

@@ -101,7 +101,7 @@ Result<std::vector<double>> numbers_of(const std::vector<std::string>& words, st
 using Cameras = std::map<std::int64_t, camera::CameraDescription>;  // by COLMAP's id
 
 Result<Cameras> read_cameras(const fs::path& file) {
-  const auto text = read_file(file, kMaxBytes);
+  const auto text = read_text(file, kMaxBytes);
   if (!text) return text.error();
   Cameras cameras;
   for (const auto& [number, words] : lines_of(*text)) {
@@ -143,7 +143,7 @@ Error unknown_camera(const Place& at, const std::string& id) {
 }
 
 Result<camera::RigReading> read_rigs_txt(const fs::path& file, const Cameras& cameras) {
-  const auto text = read_file(file, kMaxBytes);
+  const auto text = read_text(file, kMaxBytes);
   if (!text) return text.error();
   const auto lines = lines_of(*text);
   if (lines.size() != 1) return Error{file.string(), "", fmt::format("{} rigs", lines.size()), "one rig"};
@@ -177,7 +177,7 @@ Result<camera::RigReading> read_rigs_txt(const fs::path& file, const Cameras& ca
 // Returns the cameras of rig_config.json in the order of the file. Their number must equal the number of cameras in
 // cameras.txt.
 Result<std::vector<yaml::YamlMap>> configured_cameras(const fs::path& file, std::size_t count) {
-  const auto text = read_file(file, kMaxBytes);
+  const auto text = read_text(file, kMaxBytes);
   if (!text) return text.error();
   std::string wrapped = "{\"rigs\": " + *text + "\n}";  // the root is a list, and JSON is valid YAML except for tabs
   std::replace(wrapped.begin(), wrapped.end(), '\t', ' ');

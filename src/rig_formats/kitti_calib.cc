@@ -44,7 +44,7 @@ Result<KittiProjection> projection_of(const std::string& key, std::istringstream
 }  // namespace
 
 Result<std::vector<KittiProjection>> read_kitti_calib(const fs::path& file) {
-  const auto text = read_file(file, kMaxCalibBytes);
+  const auto text = read_text(file, kMaxCalibBytes);
   if (!text) return text.error();
   std::vector<KittiProjection> projections;
   std::istringstream lines(*text);

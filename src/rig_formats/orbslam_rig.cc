@@ -70,7 +70,8 @@ Status read_model(const yaml::YamlMap& yaml, const std::string& type, const std:
     d.model = camera::KannalaBrandt::kName;
     names = {"k1", "k2", "k3", "k4"};
   } else if (type == "PinHole") {
-    const bool distorted = yaml.has(prefix + "k1");
+    // Either both cameras of a file have coefficients or none.
+    const bool distorted = yaml.has(prefix + "k1") || yaml.has("Camera1.k1") || yaml.has("Camera2.k1");
     d.model = distorted ? camera::PinholeRadTan::kName : camera::Pinhole::kName;
     if (distorted) names = {"k1", "k2", "p1", "p2"};
     if (distorted && yaml.has(prefix + "k3")) names.push_back("k3");

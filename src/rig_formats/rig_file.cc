@@ -209,7 +209,7 @@ RigFormat format_of_output(const fs::path& out) {
 Result<RigFile> read_rig_file(const fs::path& path) {
   std::error_code error;
   if (fs::is_directory(path, error)) return read_folder(path);
-  auto text = read_file(path, kMaxRigBytes);
+  auto text = read_text(path, kMaxRigBytes);
   if (!text) return text.error();
   std::string names;
   for (const FormatEntry& format : kFormats) {

@@ -93,12 +93,13 @@ std::size_t most_frequent(const std::vector<std::size_t>& values) {
 // For each input, the position among the roots of the submap with most of its keyframes.
 std::vector<std::size_t> submaps_of_inputs(const map::BundledMap& map,
                                            const std::vector<std::vector<KeyframeId>>& inputs) {
-  const std::vector<KeyframeId> roots = map.roots();
+  const std::vector<KeyframeId> roots = map.roots(), root_of_each = map.root_of_each();
   std::vector<std::size_t> out;
   for (const std::vector<KeyframeId>& keyframes : inputs) {
     std::vector<std::size_t> submaps;
     for (const KeyframeId k : keyframes)
-      submaps.push_back(static_cast<std::size_t>(std::ranges::lower_bound(roots, map.root_of(k)) - roots.begin()));
+      submaps.push_back(
+          static_cast<std::size_t>(std::ranges::lower_bound(roots, root_of_each[k.index()]) - roots.begin()));
     out.push_back(most_frequent(submaps));
   }
   return out;

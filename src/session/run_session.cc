@@ -295,10 +295,10 @@ void add_trajectories(const RunRecord& record, const std::vector<system::SubmapT
 std::vector<Eigen::Vector3d> landmarks_of_path(const SessionResult& result) {
   std::vector<Eigen::Vector3d> out;
   if (result.trajectories.empty() || !result.map) return out;
+  const std::vector<KeyframeId> root = result.map->root_of_each();
   for (const LandmarkId l : result.map->landmark_ids()) {
     const map::Landmark& landmark = result.map->landmark(l);
-    if (result.map->root_of(landmark.reference.keyframe) == result.trajectories.front().root)
-      out.push_back(landmark.position);
+    if (root[landmark.reference.keyframe.index()] == result.trajectories.front().root) out.push_back(landmark.position);
   }
   return out;
 }

@@ -43,15 +43,16 @@ struct KnownPose {
 // The keyframes of the final map, and the first frames after changes of the calibration.
 std::vector<KnownPose> known_poses(const map::BundledMap& map, KeyframeId first, std::span<const FrameRecord> frames) {
   std::vector<KnownPose> out;
+  const std::vector<KeyframeId> root = map.root_of_each();
   for (const KeyframeId k : map.keyframe_ids()) {
     const auto at = find_record(frames, map.keyframe(k).frame->id);
     if (k.index() < first.index() || at == frames.end()) continue;
-    out.push_back({static_cast<std::size_t>(at - frames.begin()), map.keyframe(k).T_rig_world, map.root_of(k)});
+    out.push_back({static_cast<std::size_t>(at - frames.begin()), map.keyframe(k).T_rig_world, root[k.index()]});
   }
   for (std::size_t f = 0; f < frames.size(); ++f) {
     if (!frames[f].recalibrated) continue;
     if (const auto T_rig_world = T_rig_world_of(frames[f], map))
-      out.push_back({f, *T_rig_world, map.root_of(frames[f].final_result().anchored.reference)});
+      out.push_back({f, *T_rig_world, root[frames[f].final_result().anchored.reference.index()]});
   }
   std::ranges::stable_sort(out, {}, &KnownPose::frame);  // keyframes first
   const auto same_frame = [](const KnownPose& a, const KnownPose& b) { return a.frame == b.frame; };

@@ -129,7 +129,8 @@ Result<FrameRecord> System::process(const image::ImageBundle& images) {
   last_input_ = FrameStamp{images.id, images.time_ns};
   const bool had_pose = pipeline_.status() != tracking::TrackStatus::kNotStarted;
   const bool whole = cameras_.size == rig_.size();
-  Pipeline::Outcome outcome = pipeline_.process(whole ? images : widened(images, cameras_, rig_.size()), *executor_);
+  Pipeline::Outcome outcome = whole ? pipeline_.process(images, *executor_)
+                                    : pipeline_.process(widened(images, cameras_, rig_.size()), *executor_);
   narrow(outcome.record, cameras_);
   narrow(outcome.observed, cameras_);
   maps_started_ += outcome.started_submap;
@@ -334,12 +335,13 @@ TimeNs System::keyframe_time(KeyframeId k) const {
 std::vector<SubmapTrajectory> System::trajectories() const {
   const map::MapSnapshot map = store_.snapshot();
   std::vector<SubmapTrajectory> out;
+  const std::vector<KeyframeId> root = map->root_of_each();
   std::vector<std::optional<geometry::SE3>> between;
   if (calibration_refined_) between = poses_between_keyframes(*map, first_keyframe_, frames_);
   for (std::size_t i = 0; i < frames_.size(); ++i) {
     const tracking::TrackResult& r = frames_[i].final_result();
     if (const auto T_rig_world = between.empty() ? T_rig_world_of(frames_[i], *map) : between[i])
-      add_pose(out, map->root_of(r.anchored.reference), r.time_ns, T_rig_world->inverse());
+      add_pose(out, root[r.anchored.reference.index()], r.time_ns, T_rig_world->inverse());
   }
   for (SubmapTrajectory& submap : out) submap.loaded = submap.root < first_keyframe_;
   std::stable_sort(out.begin(), out.end(), [](const SubmapTrajectory& a, const SubmapTrajectory& b) {

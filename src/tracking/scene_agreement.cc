@@ -51,7 +51,7 @@ SceneMatches::SceneMatches(const TrackInput& input, const frame::BundledFrame& f
   if (!reference.valid()) return;
   T_world_keyframe_ = input.map.resolved_pose(reference).inverse();
   const frame::BundledFrame& before = *input.map.keyframe(reference).frame;
-  const camera::Rig rig_before = frame::rig_of(input.map.rig(), before), rig = frame::rig_of(input.map.rig(), frame);
+  const camera::Rig rig_before = input.map.rig_of(reference), rig = frame::rig_of(input.map.rig(), frame);
   for (std::size_t c = 0; c < frame.cameras.size(); ++c) {
     const std::vector<CameraConsensusState>& cameras = input.state.cameras;
     const bool excluded = c < cameras.size() && cameras[c].excluded;

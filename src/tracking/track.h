@@ -99,7 +99,8 @@ struct TrackerState {
   int best_overlap = 0;
   std::vector<int> best_direct_overlap;  // per camera: the same maximum for frames that were tracked directly
   DirectState direct;
-  std::vector<map::VisibilityCount> visibility_counts;  // not yet added to the map
+  // Not yet added to the map; one for each landmark, sorted.
+  std::vector<map::VisibilityCount> visibility_counts;
 };
 
 // Per camera: whether it is excluded because it contradicted the other cameras or lost its landmarks.

@@ -34,13 +34,31 @@ void add_errors(const map::BundledMap& map, const frame::BundledFrame& frame, co
   }
 }
 
-// Each landmark predicted visible counts once, even if it is visible in several cameras.
+// Adds the counts of a frame. Each landmark predicted visible counts once, even if it is visible in several cameras.
+// `found` is sorted.
 void count_visibility(const std::vector<LandmarkId>& visible, const std::vector<LandmarkId>& found,
-                      TrackerState& state) {
-  for (const LandmarkId l : found) state.visibility_counts.push_back({l, 1, 1});
+                      std::vector<map::VisibilityCount>& counts) {
+  const auto earlier = static_cast<std::ptrdiff_t>(counts.size());
+  const auto add = [&](LandmarkId l, std::uint32_t times_found) {
+    const auto end = counts.begin() + earlier;
+    const auto known = std::lower_bound(counts.begin(), end, l,
+                                        [](const map::VisibilityCount& c, LandmarkId id) { return c.landmark < id; });
+    if (known == end || known->landmark != l) {
+      counts.push_back({l, 1, times_found});
+    } else {
+      ++known->expected;
+      known->found += times_found;
+    }
+  };
+  for (const LandmarkId l : found) add(l, 1);
   for (const LandmarkId l : visible) {
-    if (!std::binary_search(found.begin(), found.end(), l)) state.visibility_counts.push_back({l, 1, 0});
+    if (!std::binary_search(found.begin(), found.end(), l)) add(l, 0);
   }
+  const auto order = [](const map::VisibilityCount& a, const map::VisibilityCount& b) {
+    return a.landmark < b.landmark;
+  };
+  std::sort(counts.begin() + earlier, counts.end(), order);
+  std::inplace_merge(counts.begin(), counts.begin() + earlier, counts.end(), order);
 }
 
 // The noise of the image relative to the map, and the error of the reference keyframe. The noise is the inverse of the
@@ -128,7 +146,7 @@ TrackOutput output_of(const TrackInput& input, TrackedFrame found) {
   state.status = TrackStatus::kTracking;
   state.time_ns = frame.time_ns;
   state.landmarks = landmarks_of(out.matches);
-  count_visibility(found.visible, state.landmarks, state);
+  count_visibility(found.visible, state.landmarks, state.visibility_counts);
   state.cameras.resize(out.matches.size());
   ++state.frames_since_keyframe;
   return out;

@@ -263,6 +263,7 @@ void Tracker::track(Input& input, TrackOutcome& outcome) {
 bool Tracker::keep_direct_pose(const Input& input, TrackOutcome& outcome) const {
   constexpr int kMaxKept = 5;
   if (!input.direct.outcome || outcome.next.direct_kept >= kMaxKept) return false;
+  if (input.direct.failure == DirectFailure::kDoubtful) return false;
   std::vector<StageTime> stages = std::move(outcome.record.stages);
   const int kept = outcome.next.direct_kept + 1;
   outcome = *input.direct.outcome;

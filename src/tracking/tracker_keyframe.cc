@@ -12,23 +12,6 @@
 namespace bslam::tracking {
 namespace {
 
-// Sums the counts of each landmark, in order of id.
-std::vector<map::VisibilityCount> folded(std::vector<map::VisibilityCount> counts) {
-  std::stable_sort(counts.begin(), counts.end(), [](const map::VisibilityCount& a, const map::VisibilityCount& b) {
-    return a.landmark < b.landmark;
-  });
-  std::vector<map::VisibilityCount> out;
-  for (const map::VisibilityCount& s : counts) {
-    if (out.empty() || out.back().landmark != s.landmark) {
-      out.push_back(s);
-    } else {
-      out.back().expected += s.expected;
-      out.back().found += s.found;
-    }
-  }
-  return out;
-}
-
 // The keyframe that was created from the pending frame; invalid if the map has none.
 KeyframeId keyframe_of(const map::BundledMap& map, const PendingKeyframe& pending) {
   for (std::size_t k = pending.first_keyframe; k < map.keyframe_slots(); ++k) {
@@ -43,7 +26,7 @@ KeyframeId keyframe_of(const map::BundledMap& map, const PendingKeyframe& pendin
 void Tracker::propose_keyframe(Input& input, const TrackOutput& output, TrackOutcome& outcome) const {
   const Stopwatch watch;
   map::MapDraft draft(input.map);
-  draft.add_visibility_counts(folded(std::move(outcome.next.track.visibility_counts)));
+  draft.add_visibility_counts(std::move(outcome.next.track.visibility_counts));
   if (relocaliser_) relocaliser_->describe(input.frame);
   NewKeyframe made = make_keyframe(input.frame, output.matches, output.result.T_rig_world, input.pyramids,
                                    output.result.anchored.reference, options_.tracking.initialisation, draft);

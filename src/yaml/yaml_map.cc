@@ -18,7 +18,7 @@ Result<YamlMap> YamlMap::parse(const std::filesystem::path& file, std::string te
     YAML::Node root = YAML::Load(text);
     if (!root.IsDefined() || root.IsNull()) root = YAML::Node(YAML::NodeType::Map);
     if (!root.IsMap()) return Error{file.string(), "", describe(root), "a YAML map"};
-    return YamlMap(file.string(), "", root);
+    return with_unique_keys(YamlMap(file.string(), "", root));
   } catch (const YAML::Exception& e) {
     const std::string line = e.mark.is_null() ? "" : fmt::format("line {}", e.mark.line + 1);
     return Error{file.string(), line, "invalid YAML (" + e.msg + ")", "YAML"};
@@ -35,8 +35,16 @@ bool YamlMap::has(std::string_view key) const {
   return node.IsDefined() && !node.IsNull();
 }
 
-Status YamlMap::allow_only(const std::vector<std::string>& known) const {
+Result<YamlMap> YamlMap::with_unique_keys(YamlMap map) {
   std::set<std::string> seen;
+  for (const auto& entry : map.node_) {
+    if (entry.first.IsScalar() && !seen.insert(entry.first.Scalar()).second)
+      return map.error(entry.first.Scalar(), "a repeated key", "a unique key");
+  }
+  return map;
+}
+
+Status YamlMap::allow_only(const std::vector<std::string>& known) const {
   for (const auto& entry : node_) {
     const std::string key = entry.first.IsScalar() ? entry.first.Scalar() : describe(entry.first);
     if (std::find(known.begin(), known.end(), key) == known.end()) {
@@ -45,7 +53,6 @@ Status YamlMap::allow_only(const std::vector<std::string>& known) const {
       unknown.sentence = nearest.empty() ? "unknown key" : "unknown key; did you mean '" + nearest + "'?";
       return unknown;
     }
-    if (!seen.insert(key).second) return error(key, "a repeated key", "a unique key");
   }
   return {};
 }
@@ -107,7 +114,7 @@ Result<std::vector<double>> YamlMap::rows(std::string_view key, int size) const 
 Result<YamlMap> YamlMap::map(std::string_view key) const {
   const YAML::Node node = at(key);
   if (!node.IsDefined() || !node.IsMap()) return error(key, describe(node), "a map");
-  return YamlMap(file_, key_path(key) + ".", node);
+  return with_unique_keys(YamlMap(file_, key_path(key) + ".", node));
 }
 
 Result<std::vector<YamlMap>> YamlMap::maps(std::string_view key) const {
@@ -119,7 +126,9 @@ Result<std::vector<YamlMap>> YamlMap::maps(std::string_view key) const {
   for (const YAML::Node& entry : node) {
     const std::string entry_key = fmt::format("{}[{}]", key, out.size());
     if (!entry.IsMap()) return error(entry_key, describe(entry), "a map");
-    out.push_back(YamlMap(file_, key_path(entry_key) + ".", entry));
+    auto map = with_unique_keys(YamlMap(file_, key_path(entry_key) + ".", entry));
+    if (!map) return map.error();
+    out.push_back(*std::move(map));
   }
   return out;
 }

@@ -19,12 +19,12 @@ class YamlMap {
  public:
   // Parses `text`, a document that is empty or whose root is a map. `file` is its name in errors and is not read. A
   // first line `%YAML:1.0`, which OpenCV and EuRoC write although it is not valid YAML, is ignored. Syntax errors name
-  // the line.
+  // the line. A repeated key is an error in this map and in those that map() and maps() return.
   static Result<YamlMap> parse(const std::filesystem::path& file, std::string text);
 
   // Returns true if the key is present and its value is not null.
   bool has(std::string_view key) const;
-  // Errors: a key that is not in `known`, with a suggestion if one is close; a repeated key.
+  // Errors: a key that is not in `known`, with a suggestion if one is close.
   Status allow_only(const std::vector<std::string>& known) const;
 
   Result<double> number(std::string_view key) const;
@@ -46,6 +46,7 @@ class YamlMap {
  private:
   YamlMap(std::string file, std::string prefix, YAML::Node node)
       : file_(std::move(file)), prefix_(std::move(prefix)), node_(std::move(node)) {}
+  static Result<YamlMap> with_unique_keys(YamlMap map);
   YAML::Node at(std::string_view key) const;
   Result<std::vector<double>> number_list(const YAML::Node& list, const std::string& key) const;
 

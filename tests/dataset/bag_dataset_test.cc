@@ -124,6 +124,14 @@ TEST_F(SmallBag, Ros2IsReadAsTheFolder) {
   support::write_text(folder_.path() / "a.mcap", support::mcap_bytes(all, Wire::kCdr, {"zstd"}));
   expect_same(request(folder_.path() / "a.mcap"));
 
+  support::write_text(folder / "metadata.yaml", "rosbag2_bagfile_information:\n  version: 5\n");
+  const auto without_list = open_dataset(request(folder));
+  ASSERT_TRUE(without_list) << without_list.error().message();
+  EXPECT_EQ(without_list->frames.size(), static_cast<std::size_t>(support::kSmallFrames));
+  EXPECT_TRUE(has(without_list->warnings, "all message files of the folder are read"));
+
+  support::write_text(folder / "metadata.yaml",
+                      "rosbag2_bagfile_information:\n  relative_file_paths:\n    - ros2_0.db3\n    - ros2_1.db3\n");
   fs::remove(folder / "ros2_0.db3");
   const auto rest = open_dataset(request(folder));
   ASSERT_TRUE(rest) << rest.error().message();

@@ -68,6 +68,13 @@ TEST_F(SmallKitti, WarnsOfImagesWithoutATime) {
   EXPECT_EQ(dataset->warnings.size(), 1u);
 }
 
+TEST_F(SmallKitti, RejectsTimesThatAreNoSeconds) {
+  std::string times;
+  for (int k = 0; k < 10; ++k) times += std::to_string(100'000'000 * k) + "\n";
+  support::write_text(data() / "times.txt", times);
+  EXPECT_EQ(open().error().found, "times 1e+08 s apart");
+}
+
 TEST_F(SmallKitti, RejectsInvalidTimes) {
   support::write_text(data() / "times.txt", "0.0\nsoon\n");
   EXPECT_EQ(open().error().key, "line 2");
@@ -100,6 +107,21 @@ TEST(FolderDataset, LeftAndRightAreCameras) {
   EXPECT_EQ(dataset->frames[2].images[1]->path.parent_path(), data / "right");
 }
 
+TEST(FolderDataset, ACameraWithItsListBesideItsImagesIsNotEurocs) {
+  const support::TemporaryFolder folder;
+  support::write_small_euroc(folder.path() / "euroc");
+  const fs::path data = folder.path() / "plain";
+  for (const std::string camera : {"cam0", "cam1"}) {
+    fs::create_directories(data);
+    fs::rename(folder.path() / "euroc/mav0" / camera / "data", data / camera);
+    fs::copy_file(folder.path() / "euroc/mav0" / camera / "data.csv", data / camera / "data.csv");
+  }
+  const auto dataset = open_dataset({.path = data, .rig_file = folder.path() / "euroc"});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(dataset->format, DatasetFormat::kFolder);
+  EXPECT_EQ(dataset->frames.size(), static_cast<std::size_t>(support::kSmallFrames));
+}
+
 // KITTI raw data: the calibration of the day is beside the folders of its drives.
 TEST(KittiRaw, DatesAndTheCalibrationOfTheDayAreRead) {
   const support::TemporaryFolder day;
@@ -129,6 +151,19 @@ TEST(KittiRaw, DatesAndTheCalibrationOfTheDayAreRead) {
   EXPECT_EQ(dataset->frames[3].time_ns - dataset->first_time_ns, 300'000'000);
   EXPECT_NEAR(dataset->rig.rig_from_cam(1).translation().x(), 0.5, 1e-9);
   EXPECT_EQ(read_frame(*dataset, 4).images[1].state, ImageState::kPresent);
+
+  // A line without a date is an image without a time.
+  std::string dates = support::read_text(data / "image_00/timestamps.txt");
+  const std::size_t second = dates.find('\n') + 1, third = dates.find('\n', second);
+  support::write_text(data / "image_00/timestamps.txt", dates.erase(second, third - second));
+  const auto incomplete = open_dataset(request);
+  ASSERT_TRUE(incomplete) << incomplete.error().message();
+  EXPECT_EQ(incomplete->frames[2].images[0]->path.filename(), "0000000002.png");
+  EXPECT_EQ(incomplete->frames[2].time_ns, dataset->frames[2].time_ns);
+  EXPECT_FALSE(incomplete->frames[1].images[0]);
+  ASSERT_EQ(incomplete->warnings.size(), 1u);
+  EXPECT_TRUE(incomplete->warnings[0].ends_with("are not listed and are not used, the first: 0000000001.png"));
+
   support::write_text(data / "image_00/timestamps.txt", "2011-13-26 13:02:25.9\n");
   EXPECT_EQ(open_dataset(request).error().key, "line 1");
 }

@@ -5,6 +5,7 @@
 #include <fstream>
 
 #include "dataset/frame_reader.h"
+#include "dataset/recording_description.h"
 #include "rig_formats/rig_file.h"
 #include "support/data_on_disk.h"
 
@@ -445,8 +446,31 @@ TEST_F(SmallEuroc, TheFirstImagesMayBeDamaged) {
   EXPECT_TRUE(open_dataset({.path = data(), .cameras = {1}}));
 }
 
+TEST_F(SmallEuroc, WarnsOfImagesThatAreNotListed) {
+  support::write_text(camera(0) / "data.csv", support::small_list({0, 1, 2, 3, 4}));
+  const auto dataset = open();
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  ASSERT_EQ(dataset->warnings.size(), 1u) << dataset->warnings.back();
+  EXPECT_EQ(dataset->warnings[0], (camera(0) / "data.csv").string() + ": " + std::to_string(support::kSmallFrames - 5) +
+                                      " of " + std::to_string(support::kSmallFrames) + " images in " +
+                                      (camera(0) / "data").string() +
+                                      " are not listed and are not used, the first: " + support::small_image_name(5));
+}
+
+TEST_F(SmallEuroc, IsNotOnlyUncalibratedIfItsListsCannotBeRead) {
+  for (const int c : {0, 1}) fs::remove(camera(c) / "sensor.yaml");
+  EXPECT_TRUE(describe_recording({.path = data()})->only_uncalibrated);
+  for (const int c : {0, 1}) support::write_text(camera(c) / "data.csv", "soon,0.png\n");
+  const auto described = describe_recording({.path = data()});
+  ASSERT_TRUE(described);
+  EXPECT_FALSE(described->only_uncalibrated);
+  ASSERT_EQ(described->streams.size(), 2u);
+  EXPECT_EQ(described->streams[1].name, "camera 1");
+  EXPECT_NE(described->streams[1].unused.find("found soon"), std::string::npos) << described->streams[1].unused;
+}
+
 TEST_F(SmallEuroc, ReadsListsFromOtherSystems) {
-  std::string text = "#timestamp [ns],filename\r\n\r\n# a word\r\n";
+  std::string text = "\xEF\xBB\xBF#timestamp [ns],filename\r\n\r\n# a word\r\n";
   for (int k = 0; k < support::kSmallFrames; ++k) {
     const std::string l = line(k);
     text += "  " + l.substr(0, l.find(',')) + " , " + support::small_image_name(k) + " \r\n";

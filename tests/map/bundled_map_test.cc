@@ -66,6 +66,7 @@ TEST_F(BundledMapTest, StartsASubmapWithAKeyframeWithoutParent) {
   EXPECT_EQ(map.root_of(a), KeyframeId(0));
   EXPECT_EQ(map.root_of(c), b);
   EXPECT_EQ(map.root_of(d), d);
+  EXPECT_EQ(map.root_of_each(), (std::vector{KeyframeId(0), KeyframeId(0), b, b, d}));
   map.remove_keyframe(c);
   EXPECT_FALSE(map.keyframe(add({}, c)).parent.valid());  // a removed keyframe cannot become a parent
   expect_valid();
@@ -83,6 +84,7 @@ TEST_F(BundledMapTest, ReversesTheLinksWhenSubmapsAreMerged) {
   EXPECT_EQ(map.keyframe(side).parent, r);
   EXPECT_EQ(map.keyframe(below).parent, t);
   EXPECT_EQ(map.roots(), std::vector{KeyframeId(0)});
+  EXPECT_EQ(map.root_of_each(), std::vector(7, KeyframeId(0)));
   for (const KeyframeId k : map.keyframe_ids()) {
     EXPECT_EQ(map.root_of(k), KeyframeId(0));
     EXPECT_EQ(map.keyframe(k).T_rig_world.translation(), poses[k.index()].translation());

@@ -34,6 +34,21 @@ TEST(MapStore, DoesNotReuseIdsAfterARestart) {
   EXPECT_EQ(after.published->roots(), after.keyframes);
 }
 
+// A calibration that was estimated from a wrong map is wrong as well.
+TEST(MapStore, ARestartWithdrawsTheEstimatedCalibration) {
+  const camera::Rig given = *synthetic_rig(2);
+  MapStore store{BundledMap(synthetic_rig(2))};
+  std::vector<camera::RigCamera> cameras;
+  for (std::size_t c = 0; c < given.size(); ++c) cameras.push_back({given.camera(c), given.body_from_cam(c)});
+  cameras[1].T_body_cam = cameras[1].T_body_cam * geometry::SE3(Eigen::Quaterniond::Identity(), {0.01, 0, 0});
+  MapDraft draft(store.snapshot());
+  draft.set_rig(camera::Rig(std::move(cameras)), std::make_shared<const Eigen::MatrixXd>(Eigen::MatrixXd::Zero(6, 6)));
+  ASSERT_FALSE(store.commit(std::move(draft)).published->rig().same_calibration(given));
+  store.restart();
+  EXPECT_TRUE(store.snapshot()->rig().same_calibration(given));
+  EXPECT_EQ(store.snapshot()->rig_deviation(), nullptr);
+}
+
 TEST(MapStore, CountsVersionsAndKeepsProvisionalIdsWithoutOtherCommits) {
   Random random(1);
   MapStore store{BundledMap(synthetic_rig(1))};

@@ -244,6 +244,21 @@ TEST_F(RigFormats, KalibrWithAGapInItsNumbersIsRejected) {
   EXPECT_NE(file.error().message().find("cam3"), std::string::npos) << file.error().message();
 }
 
+TEST_F(RigFormats, KalibrWithACameraTwiceIsRejected) {
+  std::string text(kKalibr);
+  text += text.substr(text.find("cam1:"));
+  const auto file = read(text);
+  ASSERT_FALSE(file);
+  EXPECT_EQ(file.error().key, "cam1");
+  EXPECT_EQ(file.error().found, "a repeated key");
+}
+
+TEST_F(RigFormats, AByteOrderMarkIsIgnored) {
+  const auto file = read("\xEF\xBB\xBF" + std::string(kKalibr));
+  ASSERT_TRUE(file) << file.error().message();
+  EXPECT_EQ(file->rig.size(), read(kKalibr)->rig.size());
+}
+
 TEST_F(RigFormats, KalibrOmniBecomesTheUnifiedModel) {
   const std::string text = R"(cam0:
   camera_model: omni
@@ -461,10 +476,30 @@ TEST_F(RigFormats, OrbslamRejectsInvalidValues) {
         Case{"Camera.width: 512", "Camera.width: wide", "Camera.width"},
         Case{"Camera.height: 512", "", "Camera.height"}, Case{"Stereo.T_c1_c2", "Stereo.T_c2_c1", "Stereo.T_c1_c2"},
         Case{"0.999999445773493", "1.2", "Stereo.T_c1_c2.data"},
-        Case{"Camera2.fy: 190", "Camera2.fz: 190", "Camera2.fy"}}) {
+        Case{"Camera2.fy: 190", "Camera2.fz: 190", "Camera2.fy"},
+        Case{"Camera2.fx: 190", "Camera1.fx: 190", "Camera1.fx"}}) {
     const auto file = read_with(kOrbslam, c.from, c.to);
     ASSERT_FALSE(file) << c.to;
     EXPECT_EQ(file.error().key, c.key) << file.error().message();
+  }
+}
+
+TEST_F(RigFormats, OrbslamPinholesHaveCoefficientsBothOrNeither) {
+  std::string pinholes(kOrbslam);
+  pinholes.replace(pinholes.find("KannalaBrandt8"), std::string_view("KannalaBrandt8").size(), "PinHole");
+  for (const char* camera : {"Camera1.", "Camera2."}) {
+    for (const auto& [from, to] : {std::pair{"k3: -0", "p1: 0"}, std::pair{"k4: 0", "p2: 0"}}) {
+      const std::string key = std::string(camera) + from;
+      pinholes.replace(pinholes.find(key), key.size(), std::string(camera) + to);
+    }
+  }
+  ASSERT_TRUE(read(pinholes)) << read(pinholes).error().message();
+  for (const std::string key : {"Camera1.k1", "Camera2.k1"}) {
+    std::string without = pinholes;
+    without.erase(without.find(key), without.find('\n', without.find(key)) + 1 - without.find(key));
+    const auto file = read(without);
+    ASSERT_FALSE(file) << key;
+    EXPECT_EQ(file.error().key, key) << file.error().message();
   }
 }
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <map>
 
 #include "tracking/simulated_tracker.h"
 
@@ -192,6 +193,24 @@ TEST_F(Track, CountsPredictedAndFoundLandmarks) {
   EXPECT_EQ(found, out.state.landmarks.size());
   EXPECT_GT(expected, found);
   EXPECT_GT(static_cast<double>(found), 0.6 * static_cast<double>(expected));  // 85 % are detected in each camera
+}
+
+// A rig can stay at a place for hours without a new keyframe.
+TEST_F(Track, CountsEachLandmarkOnceHoweverManyFramesSeeIt) {
+  SimulatedTracker tracker(world());
+  std::map<LandmarkId, std::uint32_t> expected;
+  for (int i = 1; i <= 5; ++i) {
+    const TrackOutput out = tracker.track(seen(i).frame);
+    ASSERT_EQ(out.result.status, TrackStatus::kTracking);
+    const std::vector<map::VisibilityCount>& counts = out.state.visibility_counts;
+    for (std::size_t k = 1; k < counts.size(); ++k) ASSERT_LT(counts[k - 1].landmark, counts[k].landmark);
+    for (const LandmarkId l : out.state.landmarks) ++expected[l];
+    for (const map::VisibilityCount& count : counts) {
+      EXPECT_EQ(count.found, expected[count.landmark]);
+      EXPECT_LE(count.expected, static_cast<std::uint32_t>(i));
+      EXPECT_GE(count.expected, count.found);
+    }
+  }
 }
 
 TEST_F(Track, IsLostWithoutFeaturesAndResumes) {

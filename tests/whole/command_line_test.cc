@@ -36,6 +36,8 @@ TEST_F(CommandLine, SuggestsCorrectionsOfMisspelledWords) {
       {base + " --rate fast", "bslam: command line: --rate: found fast, expected a number\n"},
       {base + " --pace slow", "bslam: command line: --pace: found slow, expected one of: fast, realtime\n"},
       {base + " --rig", "bslam: command line: --rig: found no value after it, expected a value\n"},
+      {base + " --load-map ''", "bslam: command line: --load-map: found an empty value, expected a value\n"},
+      {"rig info ''", "bslam: command line: FILE: found an empty value, expected a value\n"},
       {base + " --no-report --rerun r.rrd", "as well, expected one of --"},
       {"eval a b --max-dt -1", "--max-dt: found -1, expected a number from 0 to 1000000\n"},
       {"eval a b --camera -1", "--camera: found -1, expected a whole number of 0 or more\n"},
