@@ -62,7 +62,7 @@ def content_of(cache: str, recording: str) -> str:
     local = isinstance(system, LocalFileSystem)
     files = sorted(_files_below(root) if local else system.find(root))
     if not files:
-        raise FileNotFoundError(f"cannot open {recording}: No such file or directory")
+        raise FileNotFoundError("No such file or directory")
     listing = [(os.path.relpath(f, root), *(_stat(f) if local else [system.ukey(f)])) for f in files]
     if not local:
         return key_of(listing)
