@@ -1,6 +1,7 @@
 """Requests to map many recordings that fail, and the files of a request, which become part of the cache."""
 
 import json
+import os
 import subprocess
 import sys
 
@@ -11,8 +12,11 @@ pytest.importorskip("distributed", reason="distributed is not installed: the fle
 
 from bslam.fleet import map_recordings
 from bslam.fleet._cache import content_of
+from bslam.fleet._files import shared_rig
 from bslam.fleet._sketch import likely_pairs
+from conftest import RIG
 from distributed import Client, LocalCluster
+from PIL import Image
 
 
 @pytest.fixture(scope="module")
@@ -99,6 +103,38 @@ def test_other_site_json_is_not_replaced(recording, cluster, tmp_path, text):
         assert (tmp_path / "site.json").read_text() == text
         map_recordings([recording.folder], tmp_path, client=client, overwrite=True, settings=["foo=1"])
     assert json.loads((tmp_path / "site.json").read_text())["schema"] == 1
+
+
+def masked_rig(folder, ignored):
+    """A rig file with a mask beside it, whose first column has this value."""
+    folder.mkdir(exist_ok=True)
+    size = bslam.Rig.load(RIG)[0].resolution
+    mask = Image.new("L", size, 255)
+    mask.paste(ignored, (0, 0, 1, size[1]))
+    mask.save(folder / 'the "mask".png')
+    text = RIG.read_text().replace("  - name: cam1", "    mask: 'the \"mask\".png'\n  - name: cam1")
+    (folder / "rig.yaml").write_text(text)
+    return folder / "rig.yaml"
+
+
+def test_masks_of_a_rig_are_shared_with_it(tmp_path):
+    rig = masked_rig(tmp_path / "given", 0)
+    first = shared_rig(tmp_path / "cache", rig)
+    assert (bslam.Rig.load(first)[0].mask == bslam.Rig.load(rig)[0].mask).all()
+    assert not bslam.Rig.load(first)[0].mask.all()
+    assert shared_rig(tmp_path / "cache", rig) == first
+    os.rename(tmp_path / "given", tmp_path / "moved")
+    assert shared_rig(tmp_path / "cache", tmp_path / "moved/rig.yaml") == first
+    assert bslam.Rig.load(first)[0].mask is not None
+    assert shared_rig(tmp_path / "cache", masked_rig(tmp_path / "given", 255)) != first
+
+
+def test_rigs_of_several_files_are_shared(program, tmp_path):
+    program("rig", "convert", RIG, f"{tmp_path}/colmap/", "--to=colmap", "--drop=body")
+    shared = bslam.Rig.load(shared_rig(tmp_path / "cache", tmp_path / "colmap"))
+    given = bslam.Rig.load(RIG)
+    for found, expected in zip(shared.cameras, given.cameras, strict=True):
+        assert found.intrinsics == pytest.approx(expected.intrinsics)
 
 
 def test_linked_folders_are_part_of_a_recording(recording, tmp_path):

@@ -5,14 +5,19 @@ from __future__ import annotations
 import json
 import os
 import pathlib
+import re
 import shutil
+import tempfile
 from collections.abc import Callable, Sequence
 from typing import Any, Union
 
 from .. import _bslam
 from ._cache import sha256_of
+from ._tasks import run_program
 
 Path = Union[str, "os.PathLike[str]"]
+
+_MASK = re.compile(r'^    mask: "(.*)"$', re.MULTILINE)  # in a rig file that the program has written
 
 
 def options(
@@ -20,9 +25,27 @@ def options(
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """The options of `run` and of all commands. Files are copied into the cache, under the hashes of their contents."""
     return (
-        () if rig is None else (f"--rig={_shared(cache, rig)}",),
+        () if rig is None else (f"--rig={shared_rig(cache, rig)}",),
         (*(() if config is None else (f"--config={_shared(cache, config)}",)), *(f"--set={s}" for s in settings)),
     )
+
+
+def shared_rig(cache: pathlib.Path, rig: Path) -> pathlib.Path:
+    """A rig file in the cache with the calibration and masks of `rig`, which may have any format or be a folder.
+
+    Masks are copied as well, and the file names the copies, so that its hash depends on their contents.
+    """
+    with tempfile.TemporaryDirectory() as work:
+        converted = pathlib.Path(work, "rig.yaml")
+        run_program("rig", "convert", str(pathlib.Path(rig).absolute()), str(converted), "--to=bslam")
+        text = os.fsdecode(converted.read_bytes())
+        text = _MASK.sub(lambda mask: f'    mask: "{_shared(cache, _unquoted(mask[1])).name}"', text)
+        converted.write_bytes(os.fsencode(text))
+        return _shared(cache, converted)
+
+
+def _unquoted(text: str) -> str:
+    return re.sub(r"\\(?:x([0-9a-f]{2})|(.))", lambda m: chr(int(m[1], 16)) if m[1] else m[2], text)
 
 
 def _shared(cache: pathlib.Path, file: Path) -> pathlib.Path:
