@@ -64,6 +64,13 @@ def test_address_that_cannot_be_opened_is_a_failed_recording(cluster, tmp_path):
     assert found.reason.startswith("cannot open nowhere://bucket/monday: ")
 
 
+def test_cache_that_workers_cannot_write_is_an_error(recording, cluster, tmp_path):
+    (tmp_path / "cache").mkdir()
+    (tmp_path / "cache/maps").write_text("not a folder")
+    with Client(cluster) as client, pytest.raises(bslam.Error, match="^maps: .*cache/maps: .*; the same command conti"):
+        map_recordings([recording.folder], tmp_path / "site", client=client, cache=tmp_path / "cache")
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
