@@ -152,7 +152,7 @@ def _connected(client: Client | None, scheduler: str | None, workers: int | None
 def _local_client(stack: contextlib.ExitStack, workers: int | None) -> Client:
     # If a worker is killed, its task is probably not the cause; another worker tries it again.
     stack.enter_context(dask.config.set({"distributed.scheduler.allowed-failures": 100}))
-    count = workers or os.cpu_count()
+    count = workers or os.cpu_count() or 1
     cluster = LocalCluster(n_workers=count, threads_per_worker=1, memory_limit=0, dashboard_address=":0")
     stack.enter_context(cluster)
     cluster.adapt(minimum=count, maximum=count)  # replaces workers that do not come back
