@@ -59,7 +59,7 @@ def evaluate(
     delta: float = 1.0,
     gt_frame: Literal["cam0", "body"] = "cam0",
     rig: Path | None = None,
-    camera: int = 0,
+    camera: int | None = None,
     times: Path | None = None,
     plot: Path | None = None,
 ) -> Evaluation:
@@ -72,8 +72,10 @@ def evaluate(
         max_dt: maximum time difference in seconds between a pose and its ground truth.
         delta: time in seconds between the two poses of a relative error.
         gt_frame: frame of the ground truth poses; body needs `rig`, unless `est` is a file with poses of the body.
-        rig: calibration with the pose of the camera on the body.
-        camera: camera of the rig whose poses are estimated.
+        rig: calibration with the poses of the cameras on the body. With ground truth of cam0, poses of another camera
+            are compared with it by the rig.
+        camera: camera of the rig whose poses are estimated; default: the one that the first line of the file `est`
+            names, or 0.
         times: time stamps of KITTI poses, one per line; default: times.txt in their folder.
         plot: SVG to write, with both paths and the error over time.
 

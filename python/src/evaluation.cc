@@ -14,6 +14,7 @@
 #include "arrays.h"
 #include "base/atomic_file.h"
 #include "bindings.h"
+#include "camera/camera_name.h"
 #include "errors.h"
 #include "evaluation/association.h"
 #include "evaluation/trajectory_error.h"
@@ -33,7 +34,7 @@ struct Arguments {
   std::string align, gt_frame;
   double max_dt_s = 0, delta_s = 0;
   std::optional<Path> rig, times, plot;
-  int camera = 0;
+  std::optional<int> camera;
 };
 
 evaluation::TimedPose pose_of(const double* row, const std::string& name, std::size_t index) {
@@ -62,16 +63,34 @@ evaluation::Trajectory read(const Given& given, const std::string& name, const s
   return from_rows(std::get<Rows>(given), name);
 }
 
-// T_cam_truth of the frame of the ground truth; nullopt if it is that of the estimate.
-std::optional<geometry::SE3> frame_of_truth(const Arguments& a, const evaluation::TrajectoryComments& estimate) {
-  if (a.gt_frame != "body" || estimate.frame == "body") return std::nullopt;
-  if (!a.rig) raise({"evaluate", "gt_frame=body", "no rig", "rig=FILE with the pose of the camera on the body"});
-  const camera::Rig rig = value_of(rig_formats::read_rig(*a.rig));
-  const auto camera = static_cast<std::size_t>(a.camera);
-  if (a.camera < 0 || camera >= rig.size()) {
-    raise({a.rig->string(), "camera", std::to_string(a.camera), "a camera number below " + std::to_string(rig.size())});
+// The camera of the rig whose poses the estimate contains: the argument if given, else the one that the file names.
+std::size_t camera_of_estimate(const Arguments& a, const std::string& name, const std::string& frame,
+                               const camera::Rig& rig) {
+  if (!a.camera) {
+    if (const auto named = camera::camera_of_frame(frame, rig)) return *named;
+    raise({name, "frame", frame, "a camera of " + a.rig->string() + "; camera=N says which one it is"});
   }
-  return rig.body_from_cam(camera).inverse();
+  const auto camera = static_cast<std::size_t>(*a.camera);
+  if (*a.camera < 0 || camera >= rig.size()) {
+    raise(
+        {a.rig->string(), "camera", std::to_string(*a.camera), "a camera number below " + std::to_string(rig.size())});
+  }
+  return camera;
+}
+
+// T_cam_truth of the frame of the ground truth and of the camera of the estimate; nullopt if both paths are in one
+// frame.
+std::optional<geometry::SE3> frame_of_truth(const Arguments& a, const std::string& name,
+                                            const evaluation::TrajectoryComments& estimate) {
+  const bool body = a.gt_frame == "body";
+  if (body && estimate.frame == "body") return std::nullopt;
+  if (!a.rig) {
+    if (body) raise({"evaluate", "gt_frame=body", "no rig", "rig=FILE with the pose of the camera on the body"});
+    return std::nullopt;
+  }
+  const camera::Rig rig = value_of(rig_formats::read_rig(*a.rig));
+  const std::size_t camera = camera_of_estimate(a, name, estimate.frame, rig);
+  return body ? rig.body_from_cam(camera).inverse() : rig.cam_from_rig(camera);
 }
 
 evaluation::EvaluationOptions options_of(const Arguments& a) {
@@ -134,14 +153,15 @@ nb::dict evaluate(const Given& est, const Given& gt, const Arguments& a) {
   auto estimate = read(est, "est", a.times);
   auto truth = read(gt, "gt", a.times);
   const Path* file = std::get_if<Path>(&est);
+  const std::string name = file != nullptr ? file->string() : "est";
   const auto comments = file != nullptr ? evaluation::read_comments(*file) : evaluation::TrajectoryComments{};
-  if (const auto T_cam_truth = frame_of_truth(a, comments)) {
+  if (const auto T_cam_truth = frame_of_truth(a, name, comments)) {
     evaluation::move_to_one_frame(*T_cam_truth, comments.scale == "metric", estimate, truth);
   }
   auto result = evaluation::evaluate(estimate, truth, options);
   if (!result) {
     Error error = result.error();
-    error.file = file != nullptr ? file->string() : "est";
+    error.file = name;
     raise(error);
   }
   if (a.plot) {
@@ -158,12 +178,12 @@ void bind_evaluation(nb::module_& module) {
   module.def(
       "evaluate",
       [](const Given& est, const Given& gt, const std::string& align, double max_dt, double delta,
-         const std::string& gt_frame, const std::optional<Path>& rig, int camera, const std::optional<Path>& times,
-         const std::optional<Path>& plot) {
+         const std::string& gt_frame, const std::optional<Path>& rig, std::optional<int> camera,
+         const std::optional<Path>& times, const std::optional<Path>& plot) {
         return evaluate(est, gt, {align, gt_frame, max_dt, delta, rig, times, plot, camera});
       },
       nb::arg("est"), nb::arg("gt"), nb::arg("align"), nb::arg("max_dt"), nb::arg("delta"), nb::arg("gt_frame"),
-      nb::arg("rig").none(), nb::arg("camera"), nb::arg("times").none(), nb::arg("plot").none());
+      nb::arg("rig").none(), nb::arg("camera").none(), nb::arg("times").none(), nb::arg("plot").none());
 }
 
 }  // namespace bslam::python

@@ -59,6 +59,34 @@ def test_poses_of_the_body_in_both_files_are_not_moved(recording, program, tmp_p
     assert found.ate.rmse == theirs["ate"]["rmse"] and found.ate.max < 1e-6
 
 
+def test_camera_is_the_one_that_the_trajectory_names(recording, program, tmp_path):
+    out = tmp_path / "run"
+    program("run", recording.folder, "--mode=sequential", "--cameras=1,0", "--out", out)
+    body = recording.folder / "mav0/state_groundtruth_estimate0/data.csv"
+    rig = recording.folder / "rig.yaml"
+    estimate = out / "trajectory.tum"
+    for truth, frame in ((body, "body"), (recording.ground_truth, "cam0")):
+        found = bslam.evaluate(estimate, truth, gt_frame=frame, rig=rig)
+        theirs = json.loads(program("eval", estimate, truth, "--gt-frame", frame, "--rig", rig, "--json"))
+        assert found.ate.rmse == theirs["ate"]["rmse"]
+        other = bslam.evaluate(estimate, truth, gt_frame=frame, rig=rig, camera=0)
+        theirs = json.loads(program("eval", estimate, truth, "--gt-frame", frame, "--rig", rig, "--camera=0", "--json"))
+        assert other.ate.rmse == theirs["ate"]["rmse"] and other.ate.rmse > found.ate.rmse
+
+
+def test_a_camera_that_the_rig_does_not_have_is_an_error(recording, program, tmp_path):
+    estimate, rig = tmp_path / "other.tum", recording.folder / "rig.yaml"
+    header = "bslam trajectory frame=front parent=world final=true"
+    np.savetxt(estimate, np.loadtxt(recording.ground_truth), header=header, fmt=["%.9f"] + 7 * ["%.12f"])
+    with pytest.raises(bslam.Error) as error:
+        bslam.evaluate(estimate, recording.ground_truth, gt_frame="body", rig=rig)
+    theirs = program("eval", estimate, recording.ground_truth, "--gt-frame=body", "--rig", rig, status=2)
+    assert str(error.value) == theirs.replace("--camera N says", "camera=N says")
+    for camera in (-1, 2):
+        with pytest.raises(bslam.Error, match=f"camera: found {camera}, expected a camera number below 2"):
+            bslam.evaluate(estimate, recording.ground_truth, gt_frame="body", rig=rig, camera=camera)
+
+
 def test_errors_are_the_line_of_the_program(recording, program, tmp_path):
     (tmp_path / "bad.tum").write_text("1 2 3\n")
     (tmp_path / "late.tum").write_text("".join(f"{900 + t} {t} 0 0 0 0 0 1\n" for t in range(5)))

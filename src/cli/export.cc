@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "camera/camera_name.h"
 #include "cli/trajectory_camera.h"
 #include "cli/verbs.h"
 #include "evaluation/association.h"
@@ -60,7 +61,7 @@ Result<SE3> frame_in_camera(const std::string& name, const TrajectoryArguments& 
   if (!source) return source.error();
   const auto& [rig, camera] = *source;
   if (name == "body") return rig.body_from_cam(camera).inverse();
-  if (const auto target = name == "cam0" ? std::size_t{0} : camera_named(name, rig))
+  if (const auto target = name == "cam0" ? std::size_t{0} : camera::camera_named(name, rig))
     return rig.cam_from_rig(camera) * rig.rig_from_cam(*target);
   std::string names = "body, cam0";
   for (std::size_t c = 0; c < rig.size(); ++c) {

@@ -5,25 +5,15 @@
 #include <cstdio>
 #include <string>
 
+#include "camera/camera_name.h"
 #include "evaluation/trajectory_file.h"
 
 namespace bslam::cli {
 
-std::optional<std::size_t> camera_named(const std::string& name, const camera::Rig& rig) {
-  for (std::size_t c = 0; c < rig.size(); ++c) {
-    if (rig.camera(c).name == name) return c;
-  }
-  for (std::size_t c = 0; c < rig.size(); ++c) {
-    if (name == fmt::format("cam{}", c)) return c;
-  }
-  return std::nullopt;
-}
-
 Result<std::size_t> camera_of_trajectory(const std::filesystem::path& trajectory, const camera::Rig& rig,
                                          const std::filesystem::path& rig_file, std::optional<int> option) {
   const std::string frame = evaluation::read_comments(trajectory).frame;
-  const bool first = frame.empty() || frame == "cam0";  // cam0: camera 0, whatever its name
-  const auto named = first ? std::size_t{0} : camera_named(frame, rig);
+  const auto named = camera::camera_of_frame(frame, rig);
   if (!option) {
     if (named) return *named;
     return Error{trajectory.string(), "frame", frame,
@@ -33,7 +23,7 @@ Result<std::size_t> camera_of_trajectory(const std::filesystem::path& trajectory
     return Error{rig_file.string(), "--camera", std::to_string(*option),
                  fmt::format("a camera number below {}", rig.size())};
   const auto chosen = static_cast<std::size_t>(*option);
-  if (!first && named != chosen) {
+  if (!frame.empty() && frame != "cam0" && named != chosen) {
     fmt::print(stderr, "note: {} contains poses of {}, but --camera {} is {} of {}\n", trajectory.string(), frame,
                chosen, rig.camera(chosen).name, rig_file.string());
   }

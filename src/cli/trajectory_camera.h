@@ -17,7 +17,4 @@ namespace bslam::cli {
 Result<std::size_t> camera_of_trajectory(const std::filesystem::path& trajectory, const camera::Rig& rig,
                                          const std::filesystem::path& rig_file, std::optional<int> option);
 
-// The camera of this name, or, if no camera has it, number N of a name camN; nullopt if there is none.
-std::optional<std::size_t> camera_named(const std::string& name, const camera::Rig& rig);
-
 }  // namespace bslam::cli

@@ -33,7 +33,10 @@ def main() -> int:
     options = vars(_arguments().parse_args())
     try:
         from ._site import map_recordings
-
+    except ImportError as error:
+        print(f"bslam: fleet needs the Python package distributed ({error}): pip install distributed", file=sys.stderr)
+        return 2
+    try:
         site = map_recordings(options.pop("recordings"), options.pop("out"), progress=True, **options)
     except Error as error:
         print(f"bslam: {error}", file=sys.stderr)
@@ -41,9 +44,6 @@ def main() -> int:
     except KeyboardInterrupt:
         print("bslam: interrupted; the same command continues", file=sys.stderr)
         return 130
-    except ImportError as error:
-        print(f"bslam: fleet needs the Python package distributed ({error}): pip install distributed", file=sys.stderr)
-        return 2
     print("\n".join(site.lines()))
     return 0 if site.sites else 3
 

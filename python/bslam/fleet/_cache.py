@@ -7,7 +7,7 @@ import json
 import os
 import pathlib
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import fsspec
@@ -60,9 +60,9 @@ def content_of(cache: str, recording: str) -> str:
     """
     system, root = fsspec.url_to_fs(recording)
     local = isinstance(system, LocalFileSystem)
-    files = sorted(system.find(root))
+    files = sorted(_files_below(root) if local else system.find(root))
     if not files:
-        raise FileNotFoundError(f"cannot open {recording}: No such file or directory")
+        raise FileNotFoundError("No such file or directory")
     listing = [(os.path.relpath(f, root), *(_stat(f) if local else [system.ukey(f)])) for f in files]
     if not local:
         return key_of(listing)
@@ -82,6 +82,16 @@ def local_copy(recording: str, folder: pathlib.Path) -> str:
     copy = folder / pathlib.PurePosixPath(root).name
     system.get(root, str(copy), recursive=True)
     return str(copy)
+
+
+def _files_below(path: str, above: tuple[str, ...] = ()) -> Iterator[str]:
+    """The files below a folder, or the file itself. Links are followed, unless they lead back to a folder above."""
+    place = os.path.realpath(path)
+    if not os.path.isdir(path):
+        yield path
+    elif place not in above:
+        for name in os.listdir(path):
+            yield from _files_below(os.path.join(path, name), (*above, place))
 
 
 def _stat(file: str) -> list[int]:

@@ -7,11 +7,10 @@ import io
 import json
 import os
 import pathlib
-import shutil
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Union
+from typing import Any
 
 import click
 import dask
@@ -19,11 +18,10 @@ import numpy as np
 from distributed import CancelledError, Client, Future, KilledWorker, LocalCluster, as_completed
 
 from .. import _bslam
-from . import _tasks
-from ._cache import Result, sha256_of
+from . import _files, _tasks
+from ._cache import Result
+from ._files import Path
 from ._sketch import likely_pairs
-
-Path = Union[str, "os.PathLike[str]"]
 
 _FAN_IN = 5  # maps that are merged at once
 _NUMBERS = ("keyframes", "landmarks")  # sizes of a map
@@ -113,25 +111,20 @@ def map_recordings(
         progress: show progress on stderr.
 
     Raises:
-        Error: a folder that is not empty, a file that does not exist, recordings of the same name.
+        Error: a folder that is not empty or cannot be written, a file that does not exist, a calibration that cannot
+            be read, recordings of the same name, a scheduler that cannot be reached.
     """
-    out = pathlib.Path(out).absolute()
-    if (
-        out.exists()
-        and any(out.iterdir())
-        and not overwrite
-        and not (out / "site.json").exists()
-        and not (out / "cache").exists()
-    ):
-        raise _bslam.Error(
-            f"{out}: --out: found a folder that is not empty, expected an empty or new folder, or --overwrite"
-        )
-    folder = pathlib.Path(cache or out / "cache").absolute()
-    setup = _tasks.Setup(str(folder), _tasks.program_hash(), *_options(folder, rig, config, settings))
+    for option, number in (("--workers", workers), ("--partners", partners)):
+        if number is not None and number < 1:
+            raise _bslam.Error(f"{option}: found {number}, expected a number of at least 1")
     named = _named(recordings)
-    out.mkdir(parents=True, exist_ok=True)
+    out = pathlib.Path(out).absolute()
+    earlier = _files.open_results(out, overwrite)
+    folder = pathlib.Path(cache or out / "cache").absolute()
+    _files.make_folder(folder, "--cache")
+    setup = _tasks.Setup(str(folder), _tasks.program_hash(), *_files.options(folder, rig, config, settings))
     with _connected(client, scheduler, workers, progress) as dask_client:
-        return _Mapping(dask_client, setup, out, partners, progress).run(named)
+        return _Mapping(dask_client, setup, out, partners, progress, earlier).run(named)
 
 
 def _named(recordings: Sequence[Path]) -> list[Recording]:
@@ -141,58 +134,50 @@ def _named(recordings: Sequence[Path]) -> list[Recording]:
         recording = Recording(pathlib.PurePosixPath(data).name, data)
         if (other := named.setdefault(recording.name, recording)) is not recording:
             raise _bslam.Error(f"{data}: found a recording with the name of {other.data}, expected different names")
-        if "://" not in data and not pathlib.Path(data).exists():
+        if "://" not in data and not os.path.exists(data):
             raise _bslam.Error(f"cannot open {given}: No such file or directory")
     return [named[name] for name in sorted(named)]
-
-
-def _options(
-    cache: pathlib.Path, rig: Path | None, config: Path | None, settings: Sequence[str]
-) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """The options of `run` and of all commands. Files are copied into the cache, under the hashes of their contents."""
-
-    def shared(file: Path) -> str:
-        try:
-            copy = cache / "files" / f"{sha256_of(file)}{pathlib.Path(file).suffix}"
-        except OSError as error:
-            raise _bslam.Error(f"cannot open {file}: {error.strerror}") from error
-        if not copy.exists():
-            _copy(file, copy)
-        return str(copy)
-
-    return (
-        () if rig is None else (f"--rig={shared(rig)}",),
-        (*(() if config is None else (f"--config={shared(config)}",)), *(f"--set={s}" for s in settings)),
-    )
 
 
 @contextlib.contextmanager
 def _connected(client: Client | None, scheduler: str | None, workers: int | None, progress: bool) -> Iterator[Client]:
     with contextlib.ExitStack() as stack:
         if client is None:
-            # If a worker is killed, its task is probably not the cause; another worker tries it again.
-            stack.enter_context(dask.config.set({"distributed.scheduler.allowed-failures": 100}))
-            address: Any = scheduler
-            if address is None:
-                count = workers or os.cpu_count()
-                address = stack.enter_context(
-                    LocalCluster(n_workers=count, threads_per_worker=1, memory_limit=0, dashboard_address=":0")
-                )
-                address.adapt(minimum=count, maximum=count)  # replaces workers that do not come back
-            try:
-                client = stack.enter_context(Client(address))
-            except OSError as error:
-                raise _bslam.Error(f"the scheduler {scheduler} cannot be reached: {error}") from error
+            client = _local_client(stack, workers) if scheduler is None else _client_of(stack, scheduler)
         if progress:
             print(f"dashboard: {client.dashboard_link or 'none'}", file=sys.stderr)
         yield client
 
 
+def _local_client(stack: contextlib.ExitStack, workers: int | None) -> Client:
+    # If a worker is killed, its task is probably not the cause; another worker tries it again.
+    stack.enter_context(dask.config.set({"distributed.scheduler.allowed-failures": 100}))
+    count = workers or os.cpu_count() or 1
+    cluster = LocalCluster(n_workers=count, threads_per_worker=1, memory_limit=0, dashboard_address=":0")
+    stack.enter_context(cluster)
+    cluster.adapt(minimum=count, maximum=count)  # replaces workers that do not come back
+    return stack.enter_context(Client(cluster))
+
+
+def _client_of(stack: contextlib.ExitStack, scheduler: str) -> Client:
+    try:
+        return stack.enter_context(Client(scheduler))
+    except ValueError as error:
+        raise _bslam.Error(
+            f"--scheduler: found {scheduler}, expected an address such as tcp://HOST:8786 ({error})"
+        ) from error
+    except OSError as error:
+        raise _bslam.Error(f"the scheduler {scheduler} cannot be reached: {error}") from error
+
+
 class _Mapping:
     """One call of map_recordings."""
 
-    def __init__(self, client: Client, setup: _tasks.Setup, out: pathlib.Path, partners: int, progress: bool) -> None:
+    def __init__(
+        self, client: Client, setup: _tasks.Setup, out: pathlib.Path, partners: int, progress: bool, earlier: set[str]
+    ) -> None:
         self.client, self.setup, self.partners, self.progress = client, setup, partners, progress
+        self.earlier = earlier  # files of the result that this one replaces
         self.site = Site(out)
         self.verdicts: dict[tuple[str, str], bool] = {}  # whether the maps of a pair share a place
         self.reasons: dict[str, str] = {}  # by hash of a map: why it shares no place with another map
@@ -226,6 +211,8 @@ class _Mapping:
             raise _bslam.Error(
                 f"the scheduler or its workers were lost; the same command continues ({type(error).__name__})"
             ) from error
+        except (OSError, _tasks.ProgramKilledError) as error:
+            raise _bslam.Error(f"{label}: {_tasks.reason_of(error)}; the same command continues") from error
         computed = sum(r["computed"] for r in results)
         self.site.computed += computed
         self.site.reused += len(results) - computed
@@ -282,15 +269,15 @@ class _Mapping:
                 else:
                     r.reason = self._reason(own["map"], len(members) > 1)
                     r.map, source = f"apart/{r.name}.bmap", own
-                    _copy(pathlib.Path(own["folder"], "map.bmap"), self.site.folder / r.map)
+                    _files.copy(pathlib.Path(own["folder"], "map.bmap"), self.site.folder / r.map)
                 r.trajectory = f"trajectories/{r.name}.tum"
-                _copy(pathlib.Path(source["folder"], "trajectory.tum"), self.site.folder / r.trajectory)
+                _files.copy(pathlib.Path(source["folder"], "trajectory.tum"), self.site.folder / r.trajectory)
         self._write_summary()
 
     def _write_site(self, merged: Result, names: list[str]) -> None:
         number = len(self.site.sites) + 1
         file = "site.bmap" if number == 1 else f"site_{number}.bmap"
-        _copy(pathlib.Path(merged["folder"], "map.bmap"), self.site.folder / file)
+        _files.copy(pathlib.Path(merged["folder"], "map.bmap"), self.site.folder / file)
         self.site.sites.append({"map": file, "recordings": sorted(names), **{n: merged[n] for n in _NUMBERS}})
 
     def _reason(self, key: str, verified: bool) -> str:
@@ -299,13 +286,10 @@ class _Mapping:
         return self.reasons.get(key, "no place looks like one of another recording")
 
     def _write_summary(self) -> None:
-        summary = self.site.folder / "site.json"
-        before = _files_in(json.loads(summary.read_text())) if summary.exists() else set()
         now = {"schema": 1, "sites": self.site.sites, "recordings": [vars(r) for r in self.site.recordings]}
-        unfinished = summary.with_name(".site.json")
-        unfinished.write_text(json.dumps(now, indent=1) + "\n")
-        unfinished.replace(summary)
-        for name in before - _files_in(now):
+        text = json.dumps(now, indent=1) + "\n"
+        _files.write(self.site.folder / "site.json", lambda file: file.write_text(text))
+        for name in self.earlier - _files.files_of(now):
             (self.site.folder / name).unlink(missing_ok=True)
 
 
@@ -328,14 +312,3 @@ def _join(pairs: list[tuple[str, str]], site: dict[str, tuple[str, ...]]) -> Non
         members = tuple(sorted(site[a] + site[b]))
         parts[members] = parts[site[a]] + parts[site[b]]
         site.update(dict.fromkeys(members, members))
-
-
-def _files_in(summary: dict[str, Any]) -> set[str]:
-    return {r[kind] for r in summary["recordings"] for kind in ("map", "trajectory") if r[kind]}
-
-
-def _copy(source: Path, file: pathlib.Path) -> None:
-    file.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = file.with_name(f".{file.name}")
-    shutil.copyfile(source, unfinished)
-    unfinished.replace(file)

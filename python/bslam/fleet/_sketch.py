@@ -38,6 +38,8 @@ def likely_pairs(sketches: Sequence[Sketch], partners: int) -> list[tuple[int, i
 
     The result depends on the order of the sketches only where similarities are equal.
     """
+    if not sketches:
+        return []
     owner = np.repeat(np.arange(len(sketches)), [len(s) for s in sketches])
     common: Counter[tuple[int, int]] = Counter()
     for band in range(0, HASHES, ROWS):

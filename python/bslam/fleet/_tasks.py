@@ -23,6 +23,17 @@ from ._sketch import sketch
 _NOTHING_TRACKED = 3  # exit status
 
 
+class ProgramKilledError(RuntimeError):
+    """A signal has ended the program, for example because there was not enough memory."""
+
+
+def reason_of(error: Exception) -> str:
+    """The reason of the system, and the file that it concerns; or the text of the error."""
+    if not isinstance(error, OSError) or error.strerror is None:
+        return str(error)
+    return error.strerror if error.filename is None else f"{error.filename}: {error.strerror}"
+
+
 @dataclass(frozen=True)
 class Setup:
     """The input that is common to all tasks."""
@@ -52,8 +63,8 @@ def make_map(setup: Setup, recording: str) -> Result:
     setup.check()
     try:
         content = content_of(setup.cache, recording)
-    except OSError as error:
-        return {"error": str(error), "computed": False}
+    except (OSError, ValueError, ImportError) as error:  # the last two: an address that fsspec cannot use here
+        return {"error": f"cannot open {recording}: {reason_of(error)}", "computed": False}
 
     def make(folder: pathlib.Path) -> Result:
         with tempfile.TemporaryDirectory() as work:
@@ -96,7 +107,7 @@ def compare(setup: Setup, a: Result, b: Result) -> Result:
     setup.check()
 
     def make(_: pathlib.Path) -> Result:
-        verdict = json.loads(_program("map", "merge", *map(_map_of, (a, b)), "--dry-run", "--json", *setup.settings))
+        verdict = json.loads(run_program("map", "merge", *map(_map_of, (a, b)), "--dry-run", "--json", *setup.settings))
         reason = next((i["reason"] for i in verdict["inputs"] if not i["joined"]), "")
         return {"joined": not reason, "reason": reason}
 
@@ -109,7 +120,7 @@ def merge(setup: Setup, maps: list[Result], final: bool = False) -> Result:
 
     def make(folder: pathlib.Path) -> Result:
         options = ["--json", f"--out={folder}/map.bmap", *setup.settings, *([] if final else ["--no-final-ba"])]
-        merged = json.loads(_program("map", "merge", *map(_map_of, maps), *options))
+        merged = json.loads(run_program("map", "merge", *map(_map_of, maps), *options))
         numbers = {name: merged[name] for name in ("keyframes", "landmarks", "submaps")}
         return {"map": sha256_of(folder / "map.bmap"), **numbers}
 
@@ -123,7 +134,9 @@ def transfer(setup: Setup, own: Result, site: Result) -> Result:
     def make(folder: pathlib.Path) -> Result:
         file = folder / "trajectory.tum"
         trajectory = pathlib.Path(own["folder"], "trajectory.tum")
-        _program("map", "transfer", str(trajectory), f"--from={_map_of(own)}", f"--to={_map_of(site)}", f"--out={file}")
+        run_program(
+            "map", "transfer", str(trajectory), f"--from={_map_of(own)}", f"--to={_map_of(site)}", f"--out={file}"
+        )
         with file.open() as lines:
             return {"joined": " parent=world " in lines.readline()}
 
@@ -134,7 +147,7 @@ def _map_of(result: Result) -> str:
     return str(pathlib.Path(result["folder"], "map.bmap"))
 
 
-def _program(*arguments: str) -> str:
+def run_program(*arguments: str) -> str:
     """Runs the program and returns what it prints."""
     done = _run(*arguments)
     if done.returncode != 0:
@@ -146,7 +159,7 @@ def _run(*arguments: str) -> subprocess.CompletedProcess[str]:
     """Runs the program, which is killed if the worker ends."""
     done = subprocess.run([PROGRAM, *arguments], capture_output=True, text=True, check=False, preexec_fn=_end_together)
     if done.returncode < 0:  # Dask tries again
-        raise RuntimeError(f"bslam {arguments[0]} was ended by signal {-done.returncode}")
+        raise ProgramKilledError(f"bslam {arguments[0]} was ended by signal {-done.returncode}")
     return done
 
 
