@@ -43,12 +43,33 @@ Status check_replaceable(const std::filesystem::path& path) {
   return Error{path.string(), "", "something other than a regular file", "a regular file or a new name"};
 }
 
+// The file at the end of symbolic links, which may not exist yet: it is replaced, and the links stay.
+Result<std::filesystem::path> behind_links(const std::filesystem::path& path) {
+  constexpr int kMaxLinks = 40;  // as in the kernel
+  std::filesystem::path end = path;
+  std::error_code error;
+  for (int links = 0; std::filesystem::is_symlink(end, error); ++links) {
+    if (links < kMaxLinks) {
+      const std::filesystem::path next = std::filesystem::read_symlink(end, error);
+      end = end.parent_path() / next;  // `next` alone if it is absolute
+    } else {
+      error = std::make_error_code(std::errc::too_many_symbolic_link_levels);
+    }
+    if (!error) continue;
+    errno = error.value();
+    return system_error("write", path, kWritable);
+  }
+  return end;
+}
+
 }  // namespace
 
 Status check_writable(const std::filesystem::path& path) {
   if (Status replaceable = check_replaceable(path); !replaceable) return replaceable;
+  const auto target = behind_links(path);
+  if (!target) return target.error();
   std::filesystem::path part;
-  const FileDescriptor file(open_beside(path, part));
+  const FileDescriptor file(open_beside(*target, part));
   if (file.get() < 0) return system_error("write", path, kWritable);
   ::unlink(part.c_str());
   return {};
@@ -60,18 +81,20 @@ Status write_atomically(const std::filesystem::path& path, std::string_view byte
 
 Status write_atomically(const std::filesystem::path& path, std::span<const std::string_view> pieces) {
   if (Status replaceable = check_replaceable(path); !replaceable) return replaceable;
+  const auto target = behind_links(path);
+  if (!target) return target.error();
   std::filesystem::path part;
-  FileDescriptor file(open_beside(path, part));
+  FileDescriptor file(open_beside(*target, part));
   if (file.get() < 0) return system_error("write", path, kWritable);
   const bool written = std::ranges::all_of(pieces, [&](std::string_view p) { return write_all(file.get(), p); }) &&
-                       ::fsync(file.get()) == 0 && file.close() && ::rename(part.c_str(), path.c_str()) == 0;
+                       ::fsync(file.get()) == 0 && file.close() && ::rename(part.c_str(), target->c_str()) == 0;
   if (!written) {
     const Error error = system_error("write", path, kWritable);
     ::unlink(part.c_str());
     return error;
   }
   // The new name is durable once the folder is flushed. A file system that cannot flush folders is not an error.
-  const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
+  const std::filesystem::path folder = target->has_parent_path() ? target->parent_path() : std::filesystem::path(".");
   const FileDescriptor opened(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (opened.get() >= 0) ::fsync(opened.get());
   return {};

@@ -12,8 +12,8 @@
 namespace bslam {
 
 // Writes `bytes` to a temporary file in the same folder, flushes it to disk and renames it to `path`. The folder must
-// exist. An existing regular file is replaced; a device, for example, is an error. On error the temporary file is
-// removed and an existing file is unchanged.
+// exist. An existing regular file is replaced; a device, for example, is an error. Of a symbolic link, the file that it
+// leads to is replaced or created. On error the temporary file is removed and an existing file is unchanged.
 Status write_atomically(const std::filesystem::path& path, std::string_view bytes);
 // Writes these pieces one after the other.
 Status write_atomically(const std::filesystem::path& path, std::span<const std::string_view> pieces);

@@ -100,7 +100,7 @@ class Replacement {
 }  // namespace
 
 Result<AtomicFolder> AtomicFolder::create(const fs::path& given, bool into_existing) {
-  const fs::path place = given.has_filename() ? given : given.parent_path();  // without a slash at the end
+  fs::path place = given.has_filename() ? given : given.parent_path();  // without a slash at the end
   std::error_code error;
   if (fs::exists(place, error)) {
     if (!fs::is_directory(place, error)) return Error{place.string(), "--out", "a file", "a folder"};
@@ -109,6 +109,11 @@ Result<AtomicFolder> AtomicFolder::create(const fs::path& given, bool into_exist
   }
   if (place.has_parent_path()) fs::create_directories(place.parent_path(), error);
   if (error) return folder_error(place, error);
+  if (fs::is_symlink(place, error)) {  // the folder that it leads to is written
+    fs::path target = fs::canonical(place, error);
+    if (error) return folder_error(place, error);
+    place = std::move(target);
+  }
   for (int attempt = 0;; ++attempt) {
     fs::path part = place;
     part += ".part-" + std::to_string(::getpid()) + "-" + std::to_string(attempt);

@@ -12,8 +12,9 @@ namespace bslam {
 // commit() nothing remains of it.
 class AtomicFolder {
  public:
-  // Creates the temporary folder. Parents of `place` are created. Errors: `place` is a file; it is a folder that is not
-  // empty, unless `into_existing`; a folder cannot be created.
+  // Creates the temporary folder. Parents of `place` are created; if it is a link, the folder that it leads to is
+  // written. Errors: `place` is a file, or a link that leads nowhere; it is a folder that is not empty, unless
+  // `into_existing`; a folder cannot be created.
   static Result<AtomicFolder> create(const std::filesystem::path& place, bool into_existing);
 
   AtomicFolder(AtomicFolder&& other) noexcept;

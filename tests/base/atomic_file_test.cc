@@ -53,6 +53,37 @@ TEST(AtomicFile, NeverReplacesWhatIsNoRegularFile) {
   EXPECT_EQ(entries(folder.path()), 1);
 }
 
+TEST(AtomicFile, WritesTheFileThatALinkLeadsTo) {
+  const support::TemporaryFolder folder;
+  fs::create_directories(folder.path() / "links");
+  fs::create_directories(folder.path() / "files");
+  const fs::path link = folder.path() / "links/first", file = folder.path() / "files/file";
+  fs::create_symlink("second", link);
+  fs::create_symlink("../files/file", folder.path() / "links/second");
+  EXPECT_TRUE(check_writable(link));
+  for (const char* text : {"created", "replaced"}) {
+    ASSERT_TRUE(write_atomically(link, text));
+    EXPECT_EQ(read_file(file, 100).value(), text);
+    EXPECT_TRUE(fs::is_symlink(link));
+    EXPECT_TRUE(fs::is_regular_file(fs::symlink_status(file)));
+  }
+  EXPECT_EQ(entries(folder.path() / "links"), 2);
+  EXPECT_EQ(entries(folder.path() / "files"), 1);
+}
+
+TEST(AtomicFile, RejectsLinksThatLeadNowhere) {
+  const support::TemporaryFolder folder;
+  const fs::path loop = folder.path() / "loop", lost = folder.path() / "lost";
+  fs::create_symlink("loop", loop);
+  fs::create_symlink("none/file", lost);
+  for (const fs::path& link : {loop, lost}) {
+    EXPECT_FALSE(check_writable(link));
+    EXPECT_EQ(write_atomically(link, "text").error().file, link.string());
+    EXPECT_TRUE(fs::is_symlink(link));
+  }
+  EXPECT_EQ(entries(folder.path()), 2);
+}
+
 TEST(AtomicFile, CanBeCheckedBeforehand) {
   const support::TemporaryFolder folder;
   EXPECT_TRUE(check_writable(folder.path() / "new"));

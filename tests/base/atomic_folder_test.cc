@@ -37,6 +37,25 @@ TEST(AtomicFolder, LeavesNothingWithoutCommit) {
   EXPECT_EQ(entries_of(folder.path()), 0u);
 }
 
+TEST(AtomicFolder, WritesTheFolderThatALinkLeadsTo) {
+  const support::TemporaryFolder folder;
+  const fs::path place = folder.path() / "place", link = folder.path() / "link", lost = folder.path() / "lost";
+  fs::create_directories(place);
+  fs::create_directory_symlink("place", link);
+  fs::create_directory_symlink("none", lost);
+  for (const char* text : {"first", "second"}) {  // into an empty folder, and into one with files
+    auto written = AtomicFolder::create(link, true);
+    ASSERT_TRUE(written);
+    ASSERT_TRUE(written->write("a.txt", text));
+    const Status committed = written->commit();
+    ASSERT_TRUE(committed) << committed.error().message();
+    EXPECT_EQ(support::read_text(place / "a.txt"), text);
+    EXPECT_TRUE(fs::is_symlink(link));
+  }
+  EXPECT_FALSE(AtomicFolder::create(lost, true));
+  EXPECT_EQ(entries_of(folder.path()), 3u);
+}
+
 TEST(AtomicFolder, KeepsOtherFilesOfAnExistingFolder) {
   const support::TemporaryFolder folder;
   const fs::path place = folder.path() / "place";
