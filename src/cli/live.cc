@@ -25,6 +25,7 @@
 #include "capture/v4l2_device.h"
 #include "capture/video_modes.h"
 #include "cli/interruption.h"
+#include "cli/output_file.h"
 #include "cli/progress_bar.h"
 #include "cli/run_messages.h"
 #include "cli/shell_command.h"

@@ -4,23 +4,22 @@
 
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <limits>
 #include <memory>
-#include <string_view>
 #include <tuple>
 #include <utility>
 
 #include "base/atomic_file.h"
 #include "base/option_table.h"
 #include "cli/allocation_count.h"
+#include "cli/output_file.h"
 #include "cli/rerun.h"
 #include "cli/run_messages.h"
 #include "cli/shell_command.h"
 #include "cli/verbs.h"
 #include "map/rigs_of_map.h"
+#include "session/earlier_results.h"
 #include "session/memory_report.h"
-#include "session/record_builder.h"
 #include "session/report_data.h"
 #include "session/run_warnings.h"
 #include "storage/map_file.h"
@@ -52,26 +51,14 @@ Status check_folder(const SlamArguments& arguments) {
   return check_writable(folder / "summary.json");
 }
 
-// Creates the output folder, and removes the files of an earlier run except for those that are input of this run.
-Status prepare_folder(const SlamArguments& arguments) {
+// Creates the output folder, and moves the results of an earlier run aside, except for those that this run reads.
+Result<session::EarlierResults> prepare_folder(const SlamArguments& arguments) {
   const std::filesystem::path folder = arguments.out;
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error) return Error{folder.string(), "--out", error.message(), "a folder that can be created"};
-  if (const Status status = check_writable(folder / "summary.json"); !status) return status;
-  for (const char* name :
-       {"config.yaml", "summary.json", "trajectory.svg", "run.svg", "report.html", "rig_refined.yaml", "rerun.log"}) {
-    const auto is = [&](const std::string& input) {
-      return !input.empty() && std::filesystem::equivalent(folder / name, input, error);
-    };
-    if (!is(arguments.rig) && !is(arguments.config.file)) std::filesystem::remove(folder / name, error);
-  }
-  for (const char* stem : {"trajectory", "trajectory_live"}) {
-    for (std::size_t submap = 0; std::filesystem::remove(folder / session::trajectory_file(stem, submap), error);
-         ++submap) {
-    }
-  }
-  return {};
+  if (const Status status = check_writable(folder / "summary.json"); !status) return status.error();
+  return session::EarlierResults::move_aside(folder, {arguments.rig, arguments.config.file});
 }
 
 // Says that the map has the cameras of this run under other names: they are taken to be the same by their calibrations.
@@ -114,10 +101,11 @@ storage::MapFileInfo map_info(const session::RunRecord& record, const place::Voc
   return {vocabulary.id(), record.version, record.data, warning.empty() ? map_warning : warning};
 }
 
-// Writes all files that can be written. Returns the errors of the others.
+// Writes all files that can be written, in place of those of the earlier run. Returns the errors of the others.
 std::vector<Error> write_files(const session::SessionResult& result, const system::Config& config,
                                const dataset::Dataset& dataset, const SlamArguments& arguments,
-                               const storage::MapFileInfo& info) {
+                               const storage::MapFileInfo& info, session::EarlierResults& earlier) {
+  earlier.replace();
   const auto report = arguments.no_report
                           ? std::nullopt
                           : std::optional(session::ReportSource{dataset, arguments.command, arguments.up});
@@ -223,32 +211,6 @@ Result<system::Config> resolve_run_config(const SlamArguments& arguments) {
   return resolved;
 }
 
-namespace {
-
-bool begins_with(const std::filesystem::path& file, std::string_view text) {
-  std::string begin(text.size(), '\0');
-  std::ifstream stream(file, std::ios::binary);
-  stream.read(begin.data(), static_cast<std::streamsize>(begin.size()));
-  return stream.gcount() == 0 || begin.substr(0, static_cast<std::size_t>(stream.gcount())) == text;
-}
-
-}  // namespace
-
-Status check_output_file(const std::string& file, const char* option, bool overwrite, std::string_view begin) {
-  if (file.empty()) return {};
-  std::error_code error;
-  const std::filesystem::path path(file), folder = path.has_parent_path() ? path.parent_path() : ".";
-  if (std::filesystem::is_directory(path, error)) return Error{file, option, "a folder", "the name of a file"};
-  if (!std::filesystem::is_directory(folder, error))
-    return Error{folder.string(), option, "no such folder", "an existing folder"};
-  if (std::filesystem::is_regular_file(path, error) && !overwrite)
-    return Error{file, option, "an existing file", "a new name, or --overwrite"};
-  if (std::filesystem::is_regular_file(path, error) && !begins_with(path, begin))
-    return Error{file, option, "an existing file of another kind",
-                 "a new name; --overwrite replaces files of its kind"};
-  return check_writable(path);
-}
-
 Status check_outputs(const SlamArguments& arguments) {
   if (const Status s = check_folder(arguments); !s) return s;
   const bool writes_rerun = !is_viewer(arguments.rerun);
@@ -275,7 +237,8 @@ int run_and_write(const SlamArguments& arguments, RunInput input, session::RunCo
       {dataset, input.config, arguments.command, options.map ? options.map->keyframe_slots() : 0, arguments.up},
       control);
   if (!view) return report_error(view.error());
-  if (const Status s = prepare_folder(arguments); !s) return report_error(s.error());
+  auto earlier = prepare_folder(arguments);  // its results come back if this run has none
+  if (!earlier) return report_error(earlier.error());
   if (*view) std::fprintf(stderr, "view: %s\n", (*view)->url().c_str());
   const std::vector<std::string> of_map = warnings_of_map(arguments.load_map, map_warning);
   if (log_verbosity(arguments.log_level) >= LogVerbosity::kWarning) print_warnings(of_map);
@@ -294,7 +257,7 @@ int run_and_write(const SlamArguments& arguments, RunInput input, session::RunCo
   const std::vector<std::string> warnings = note_warnings(input, of_map, of_source, result->record);
   if (arguments.memory_report) note_report_size(*result, input.config, dataset, arguments);
   const storage::MapFileInfo info = map_info(result->record, **vocabulary, map_warning);
-  const std::vector<Error> unwritten = write_files(*result, input.config, dataset, arguments, info);
+  const std::vector<Error> unwritten = write_files(*result, input.config, dataset, arguments, info, *earlier);
   const Status sent =
       arguments.rerun.empty() || !unwritten.empty() ? Status() : send_to_rerun(arguments.out, arguments.rerun);
   end_view(view->get(), *result, input.config, dataset, arguments);

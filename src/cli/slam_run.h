@@ -6,7 +6,6 @@
 #include <optional>
 #include <span>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "cli/config_arguments.h"
@@ -41,10 +40,6 @@ std::string command_of(std::span<const char* const> command_line);
 // settings that contradict each other.
 Result<system::Config> resolve_run_config(const SlamArguments& arguments);
 
-// Checks before the run whether the file can be written after it. An existing file is replaced only with --overwrite,
-// and if it begins with `begin` or is empty: the name of another file was a mistake.
-Status check_output_file(const std::string& file, const char* option, bool overwrite, std::string_view begin);
-
 // Checks before the run, without leaving anything, whether all its output can be written: folder, map, journal, and the
 // file or viewer of --rerun.
 Status check_outputs(const SlamArguments& arguments);
@@ -63,7 +58,8 @@ struct RunInput {
 };
 
 // Loads vocabulary and map, prepares the output folder, runs, and writes the output, which check_outputs() has checked.
-// Returns the exit status; errors are printed.
+// Results of an earlier run in the folder are replaced by those of this run, and stay if it has none. Returns the exit
+// status; errors are printed.
 int run_and_write(const SlamArguments& arguments, RunInput input, session::RunControl& control);
 
 }  // namespace bslam::cli

@@ -1,0 +1,21 @@
+// Checks of the files that a command is asked to write, before it does its work.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/result.h"
+
+namespace bslam::cli {
+
+// Checks whether the file can be written. An existing file is replaced only with --overwrite, and if it begins with
+// `begin` or is empty: the name of another file was a mistake.
+Status check_output_file(const std::string& file, const char* option, bool overwrite, std::string_view begin);
+
+// Checks that the file to be written is none of those that the command reads, also under another name. Empty names of
+// inputs are ignored.
+Status check_not_input(const std::string& file, const char* option, const std::vector<std::filesystem::path>& inputs);
+
+}  // namespace bslam::cli

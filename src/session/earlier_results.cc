@@ -1,0 +1,81 @@
+#include "session/earlier_results.h"
+
+#include <algorithm>
+#include <array>
+#include <string>
+#include <system_error>
+
+namespace bslam::session {
+namespace {
+
+namespace fs = std::filesystem;
+
+// All but trajectories.
+constexpr std::array<std::string_view, 8> kNames = {"config.yaml",  "covariance_live.csv", "report.html",
+                                                    "rerun.log",    "rig_refined.yaml",    "run.svg",
+                                                    "summary.json", "trajectory.svg"};
+
+// trajectory.tum, trajectory_part2.tum, and the same of trajectory_live.
+bool is_trajectory(std::string_view name) {
+  constexpr std::string_view kEnd = ".tum", kPart = "_part";
+  if (!name.ends_with(kEnd)) return false;
+  name.remove_suffix(kEnd.size());
+  for (const std::string_view stem : {"trajectory_live", "trajectory"}) {
+    if (name == stem) return true;
+    if (!name.starts_with(std::string(stem) + std::string(kPart))) continue;
+    const std::string_view number = name.substr(stem.size() + kPart.size());
+    return !number.empty() && number.find_first_not_of("0123456789") == std::string_view::npos;
+  }
+  return false;
+}
+
+// The names of the results in a folder. Folders are none, whatever their names.
+std::vector<fs::path> results_in(const fs::path& folder) {
+  std::vector<fs::path> names;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+    const fs::path name = entry->path().filename();
+    if (is_result_file(name.string()) && !entry->is_directory(error)) names.push_back(name);
+  }
+  std::ranges::sort(names);
+  return names;
+}
+
+}  // namespace
+
+bool is_result_file(std::string_view name) { return std::ranges::count(kNames, name) > 0 || is_trajectory(name); }
+
+Result<EarlierResults> EarlierResults::move_aside(const fs::path& folder, const std::vector<fs::path>& inputs) {
+  EarlierResults results(folder);
+  for (const fs::path& name : results_in(folder)) {
+    std::error_code error;
+    const fs::path file = folder / name;
+    const auto is_file = [&](const fs::path& input) { return !input.empty() && fs::equivalent(file, input, error); };
+    if (std::ranges::any_of(inputs, is_file)) continue;
+    fs::create_directory(results.aside(), error);
+    if (!error) fs::rename(file, results.aside() / name, error);
+    if (error) {
+      const std::string reason = error.message();
+      fs::remove(results.aside(), error);  // unless files were moved there
+      return Error{file.string(), "--overwrite", reason, "a file of an earlier run that can be replaced"};
+    }
+    results.moved_.push_back(name);
+  }
+  return results;
+}
+
+EarlierResults::~EarlierResults() {
+  if (moved_.empty()) return;
+  std::error_code ignored;
+  for (const fs::path& name : moved_) fs::rename(aside() / name, folder_ / name, ignored);
+  fs::remove(aside(), ignored);  // unless there are other files
+}
+
+void EarlierResults::replace() {
+  std::error_code ignored;
+  for (const fs::path& name : results_in(aside())) fs::remove(aside() / name, ignored);
+  fs::remove(aside(), ignored);  // unless there are other files
+  moved_.clear();
+}
+
+}  // namespace bslam::session
