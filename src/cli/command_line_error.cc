@@ -118,6 +118,8 @@ std::optional<Error> value_error(const CLI::App& verb, const std::string& text) 
   if (const auto range = parted(parts->behind, " not in range "); range && range->before.starts_with("Value "))
     return option_error(parts->before, range->before.substr(std::string_view("Value ").size()),
                         range_text(range->behind, kind_of_value(verb, parts->before)));
+  if (const auto value = parted(parts->behind, kNotFinite); value && value->before.starts_with("Value "))
+    return option_error(parts->before, value->before.substr(std::string_view("Value ").size()), "a finite number");
   return std::nullopt;
 }
 
