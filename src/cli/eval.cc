@@ -10,6 +10,7 @@
 #include <string>
 
 #include "base/atomic_file.h"
+#include "cli/output_file.h"
 #include "cli/trajectory_camera.h"
 #include "cli/verbs.h"
 #include "evaluation/trajectory_error.h"
@@ -33,7 +34,7 @@ struct EvalArguments {
   double delta_s = 1.0;
   std::optional<int> camera;
   std::optional<std::filesystem::path> rig, plot, times;
-  bool json = false;
+  bool json = false, overwrite = false;
 };
 
 AlignMode align_mode(const std::string& name) {
@@ -51,9 +52,15 @@ void note_of_body(const camera::Rig& rig, const std::filesystem::path& file) {
 }
 
 // The plot is written as SVG, and its file name must end in .svg.
-Status check_plot_name(const std::optional<std::filesystem::path>& plot) {
-  if (!plot || plot->extension().empty() || plot->extension() == ".svg" || plot->extension() == ".SVG") return {};
-  return Error{"command line", "--plot", plot->string(), "a name that ends in .svg, the format that is written"};
+Status check_plot(const EvalArguments& a) {
+  if (!a.plot) return {};
+  const std::string extension = a.plot->extension();
+  if (!extension.empty() && extension != ".svg" && extension != ".SVG")
+    return Error{"command line", "--plot", a.plot->string(), "a name that ends in .svg, the format that is written"};
+  const Status other =
+      check_not_input(*a.plot, "--plot", {a.estimate, a.ground_truth, a.rig.value_or(""), a.times.value_or("")});
+  if (!other) return other;
+  return check_output_file(*a.plot, "--plot", a.overwrite, "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<svg ");
 }
 
 // Returns T_cam_frame of the frame of the ground truth and of the camera of the estimate; nullopt if both paths are in
@@ -140,7 +147,7 @@ std::string table_text(const TrajectoryEvaluation& e, const EvalArguments& argum
 }
 
 Result<TrajectoryEvaluation> evaluate_files(const EvalArguments& arguments) {
-  if (const Status status = check_plot_name(arguments.plot); !status) return status.error();
+  if (const Status status = check_plot(arguments); !status) return status.error();
   auto read = evaluation::read_trajectory(arguments.estimate, arguments.times);
   if (!read) return read.error();
   auto ground_truth = evaluation::read_trajectory(arguments.ground_truth, arguments.times);
@@ -215,6 +222,7 @@ void add_eval(CLI::App& app, int& exit_status) {
                    "time stamps of KITTI poses, one per line; default: times.txt in their folder");
   verb->add_flag("--json", arguments->json, "JSON instead of a table");
   verb->add_option("--plot", arguments->plot, "write an SVG with both paths and the error over time to this file");
+  verb->add_flag("--overwrite", arguments->overwrite, "replace an existing plot");
   verb->callback([arguments, &exit_status] { exit_status = run_eval(*arguments); });
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "camera/camera_name.h"
+#include "cli/output_file.h"
 #include "cli/trajectory_camera.h"
 #include "cli/verbs.h"
 #include "evaluation/association.h"
@@ -170,8 +171,15 @@ std::string comments(const TrajectoryArguments& arguments, const std::string& fr
   return out;
 }
 
+// Neither the trajectory nor another file of the input is replaced.
+Status check_out(const TrajectoryArguments& a) {
+  const Status other =
+      check_not_input(a.out, "--out", {a.file, a.rig.value_or(""), a.map.value_or(""), a.times.value_or("")});
+  return other ? check_new_file(a.out, a.overwrite) : other;
+}
+
 int run_export(const TrajectoryArguments& arguments) {
-  if (const Status s = check_new_file(arguments.out, arguments.overwrite); !s) return report_error(s.error());
+  if (const Status s = check_out(arguments); !s) return report_error(s.error());
   const std::string own_frame = frame_in_file(arguments);
   if (own_frame == "body" || own_frame.ends_with("_ros"))
     return report_error({arguments.file, "frame", own_frame, "a trajectory of a camera, as bslam run writes it"});

@@ -6,6 +6,7 @@
 #include "base/atomic_file.h"
 #include "cli/config_arguments.h"
 #include "cli/dataset_arguments.h"
+#include "cli/output_file.h"
 #include "cli/verbs.h"
 #include "dataset/frame_reader.h"
 #include "image_decoding/image_file.h"
@@ -19,6 +20,7 @@ struct InspectArguments {
   ConfigArguments config;
   std::string out;
   int frame = 0;
+  bool overwrite = false;
 };
 
 nlohmann::ordered_json to_json(const frame::BundledFrame& frame, const dataset::Dataset& dataset) {
@@ -45,7 +47,14 @@ nlohmann::ordered_json to_json(const frame::BundledFrame& frame, const dataset::
   return {{"time", to_seconds(frame.time_ns)}, {"cameras", std::move(cameras)}, {"features", std::move(features)}};
 }
 
+// The file must not be one of the input, and is replaced only if it is of this kind.
+Status check_out(const InspectArguments& a) {
+  if (Status s = check_not_input(a.out, "--out", {a.data.path, a.data.rig, a.config.file}); !s) return s;
+  return check_output_file(a.out, "--out", a.overwrite, "{\n \"time\"");
+}
+
 int inspect(const InspectArguments& arguments) {
+  if (const Status s = check_out(arguments); !s) return report_error(s.error());
   const auto config = resolve_config(arguments.config);
   if (!config) return report_error(config.error());
   const auto request = dataset_request(arguments.data, config->io.sync_tolerance);
@@ -76,6 +85,7 @@ void add_inspect(CLI::App& app, int& exit_status) {
   add_dataset_options(*verb, a->data);
   verb->add_option("--frame", a->frame, "index of the input frame, counted from 0")->required();
   verb->add_option("--out", a->out, "JSON file to write")->required();
+  verb->add_flag("--overwrite", a->overwrite, "replace an existing file");
   add_config_options(*verb, a->config);
   verb->callback([a, &exit_status] { exit_status = inspect(*a); });
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "cli/dataset_arguments.h"
+#include "cli/output_file.h"
 #include "cli/verbs.h"
 #include "dataset/dataset.h"
 #include "map/rigs_of_map.h"
@@ -53,8 +54,21 @@ Status complete_request(ExportArguments& arguments) {
   return {};
 }
 
+// A file must not be one of the input, and is replaced only if it is of its kind. Folders are checked as they are
+// written.
+Status check_out(const ExportArguments& arguments) {
+  const std::string out = arguments.request.out;
+  if (Status s = check_not_input(out, "--out", {arguments.file, arguments.images, arguments.rig}); !s) return s;
+  for (const map_export::FormatName& format : map_export::formats()) {
+    if (format.format == arguments.request.format && !format.is_folder)
+      return check_output_file(out, "--out", arguments.request.overwrite, format.begin);
+  }
+  return {};
+}
+
 int run_map_export(ExportArguments arguments) {
   if (const Status s = complete_request(arguments); !s) return report_error(s.error());
+  if (const Status s = check_out(arguments); !s) return report_error(s.error());
   const auto saved = storage::read_map(arguments.file);
   if (!saved) return report_error(saved.error());
   std::optional<dataset::Dataset> data;

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "cli/config_arguments.h"
+#include "cli/output_file.h"
 #include "cli/verbs.h"
 #include "cli/version.h"
 #include "session/merge_maps.h"
@@ -115,8 +116,9 @@ Status write(const session::MergeResult& merged, const place::Vocabulary& vocabu
 int map_merge(const MergeArguments& arguments) {
   if (arguments.out.empty() && !arguments.dry_run)
     return report_error({"command line", "--out", "no file", "a file for the merged map, or --dry-run"});
-  if (const Status s = check_new_file(arguments.out, arguments.overwrite || arguments.dry_run); !s)
-    return report_error(s.error());
+  const Status writable =
+      arguments.dry_run ? Status() : check_output_file(arguments.out, "--out", arguments.overwrite, "BSLAMMAP");
+  if (!writable) return report_error(writable.error());
   const auto vocabulary = storage::vocabulary_or_shipped(arguments.vocabulary);
   if (!vocabulary) return report_error(vocabulary.error());
   const auto merged = merge(arguments, *vocabulary);

@@ -4,6 +4,7 @@
 #include <memory>
 #include <string>
 
+#include "cli/output_file.h"
 #include "cli/verbs.h"
 #include "evaluation/trajectory_file.h"
 #include "session/transfer_trajectory.h"
@@ -18,7 +19,9 @@ struct TransferArguments {
 };
 
 int map_transfer(const TransferArguments& arguments) {
-  if (const Status s = check_new_file(arguments.out, arguments.overwrite); !s) return report_error(s.error());
+  for (const Status& s : {check_not_input(arguments.out, "--out", {arguments.trajectory, arguments.from, arguments.to}),
+                          check_new_file(arguments.out, arguments.overwrite)})
+    if (!s) return report_error(s.error());
   const auto trajectory = evaluation::read_trajectory(arguments.trajectory);
   if (!trajectory) return report_error(trajectory.error());
   const auto own = storage::read_map(arguments.from);

@@ -10,6 +10,7 @@
 #include "base/atomic_file.h"
 #include "cli/dataset_arguments.h"
 #include "cli/interruption.h"
+#include "cli/output_file.h"
 #include "cli/progress_bar.h"
 #include "cli/run_messages.h"
 #include "cli/shell_command.h"
@@ -90,7 +91,9 @@ int run(RunArguments& arguments) {
   const auto dataset = dataset::open_dataset(*request);
   if (!dataset) return report_error(dataset.error());
 
-  if (const Status s = check_outputs(arguments.slam); !s) return report_error(s.error());
+  for (const Status& s :
+       {check_not_input(arguments.slam.journal, "--journal", {arguments.replay}), check_outputs(arguments.slam)})
+    if (!s) return report_error(s.error());
   RunInput input{*config, *dataset, session_options(arguments, interruption), check_command(arguments.data)};
   ProgressBar bar(arguments.slam.progress == "auto", "frames");
   input.options.replay = std::move(*replay);

@@ -17,10 +17,10 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::array<FormatName, 6> kFormats = {{{"colmap", Format::kColmap, true},
-                                                 {"ply", Format::kPly, false},
-                                                 {"g2o", Format::kG2o, false},
+                                                 {"ply", Format::kPly, false, "ply\n"},
+                                                 {"g2o", Format::kG2o, false, "VERTEX_SE3:QUAT "},
                                                  {"nerfstudio", Format::kNerfstudio, true},
-                                                 {"octomap", Format::kOctomap, false},
+                                                 {"octomap", Format::kOctomap, false, "# Octomap OcTree "},
                                                  {"nav2", Format::kNav2, true}}};
 
 const FormatName* name_of(Format format) {

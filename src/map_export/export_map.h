@@ -22,7 +22,8 @@ enum class Format { kFolder, kColmap, kPly, kG2o, kNerfstudio, kOctomap, kNav2 }
 struct FormatName {
   std::string_view name;  // on the command line
   Format format;
-  bool is_folder;  // whether a folder is written, or a file
+  bool is_folder;               // whether a folder is written, or a file
+  std::string_view begin = {};  // with which the file begins
 };
 std::span<const FormatName> formats();  // all but kFolder
 
