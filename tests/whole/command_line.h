@@ -75,7 +75,7 @@ class CommandLine : public testing::Test {
 
   // Runs the program, interrupts it as soon as ready() is true, and returns its exit status; -1 if it did not exit.
   template <class Ready>
-  static int interrupted(const std::string& arguments, const Ready& ready) {
+  static int interrupted(const std::string& arguments, const Ready& ready, int signal = SIGINT) {
     const pid_t child = ::fork();
     if (child == 0) {
       const std::string command =
@@ -85,7 +85,7 @@ class CommandLine : public testing::Test {
     }
     if (child < 0) return -1;
     while (!ready() && ::waitpid(child, nullptr, WNOHANG) == 0) std::this_thread::yield();
-    ::kill(child, SIGINT);
+    ::kill(child, signal);
     int status = 0;
     return ::waitpid(child, &status, 0) == child && WIFEXITED(status) ? WEXITSTATUS(status) : -1;
   }

@@ -1,0 +1,151 @@
+// The command-line program: what becomes of files that exist already, and numbers that are none.
+#include <map>
+#include <vector>
+
+#include "whole/command_line.h"
+
+namespace bslam {
+namespace {
+
+// The files in a folder and what they contain.
+std::map<std::string, std::string> files_in(const std::string& folder) {
+  std::map<std::string, std::string> out;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    if (entry.is_regular_file()) out[entry.path().filename()] = read_text(entry.path());
+  }
+  return out;
+}
+
+TEST_F(CommandLine, ARunThatFailsKeepsTheResultsOfTheEarlierOne) {
+  summary_of("kept", "--cameras 0,1 --mode sequential --journal " + out("kept.journal"));
+  fs::rename(out("kept/trajectory.tum"), out("kept/trajectory_part2.tum"));  // as if of a further submap
+  support::write_text(out("kept/notes.txt"), "mine");
+  const auto before = files_in(out("kept"));
+  const std::string again = "run " + data() +
+                            " --cameras 0,1 --mode sequential --overwrite --no-report --progress never " +
+                            "--set features.per_image=300 --out " + out("kept");
+  const Ran failed = run(again + " --replay " + out("kept.journal"));
+  EXPECT_EQ(failed.status, 2) << failed.err;
+  EXPECT_EQ(files_in(out("kept")), before);
+  EXPECT_FALSE(fs::exists(out("kept/earlier_results")));
+  const Ran same = run(again + " --replay " + out("kept.journal") + " --journal " + out("kept.journal"));
+  EXPECT_NE(same.err.find("--journal: found a file that this command reads"), std::string::npos) << same.err;
+
+  ASSERT_EQ(run(again).status, 0);
+  EXPECT_FALSE(fs::exists(out("kept/trajectory_part2.tum")));
+  EXPECT_FALSE(fs::exists(out("kept/report.html")));
+  EXPECT_FALSE(fs::exists(out("kept/earlier_results")));
+  EXPECT_EQ(read_text(out("kept/notes.txt")), "mine");
+  EXPECT_NE(read_text(out("kept/summary.json")), before.at("summary.json"));
+}
+
+TEST_F(CommandLine, ARunThatIsKilledLeavesTheEarlierResultsInAFolderOfTheirOwn) {
+  const std::string folder = out("killed"), again = "run " + data() + " --overwrite --progress never --out " + folder;
+  summary_of("killed", "--cameras 0,1 --end 0.3 --no-report");
+  const std::string trajectory = read_text(folder + "/trajectory.tum");
+  interrupted(
+      again + " --pace realtime", [&] { return fs::exists(folder + "/earlier_results/trajectory_live.tum"); }, SIGKILL);
+  EXPECT_EQ(files_in(folder).count("trajectory.tum"), 0u);
+  EXPECT_EQ(files_in(folder).count("summary.json"), 0u);
+  EXPECT_EQ(read_text(folder + "/earlier_results/trajectory.tum"), trajectory);
+  EXPECT_EQ(run(again + " --end 0.3").status, 0);
+  EXPECT_TRUE(fs::exists(folder + "/trajectory.tum"));
+  EXPECT_FALSE(fs::exists(folder + "/earlier_results"));
+}
+
+// The calibration and the trajectory exist, and are inputs.
+TEST_F(CommandLine, AnOutputReplacesNeitherItsInputNorAFileOfAnotherKind) {
+  const std::string truth = out("truth.tum"), rig = out("mine.yaml"), notes = out("notes.svg");
+  fs::copy_file(data() + "/groundtruth_cam0.tum", truth);
+  fs::copy_file(data() + "/rig.yaml", rig);
+  fs::create_symlink(rig, out("mine.svg"));
+  support::write_text(notes, "precious");
+  const std::string inspect = "inspect " + data() + " --frame 0 --rig " + rig + " --out ", info = "rig info " + rig;
+  const std::string eval = "eval " + truth + " " + truth + " --plot ";
+  const std::string input = "found a file that this command reads", exists = "found an existing file, expected";
+  const std::string other = "found an existing file of another kind";
+  for (const auto& [arguments, message] :
+       {std::pair(inspect + rig, input), std::pair(inspect + rig + " --overwrite", input),
+        std::pair(inspect + notes, exists), std::pair(inspect + notes + " --overwrite", other),
+        std::pair(info + " --svg " + rig, input), std::pair(info + " --svg " + out("mine.svg"), input),
+        std::pair(info + " --svg " + notes, exists), std::pair(info + " --svg " + notes + " --overwrite", other),
+        std::pair(eval + notes, exists), std::pair(eval + notes + " --overwrite", other),
+        std::pair("export " + truth + " --overwrite --out " + truth, input),
+        std::pair("export " + truth + " --rig " + rig + " --frame body --overwrite --out " + rig, input)}) {
+    expect_rejected(arguments);
+    EXPECT_NE(run(arguments).err.find(message), std::string::npos) << arguments << ": " << run(arguments).err;
+  }
+  fs::rename(truth, out("truth"));  // a name without extension passes as that of a plot
+  expect_rejected("eval " + out("truth") + " " + out("truth") + " --overwrite --plot " + out("truth"));
+  EXPECT_EQ(read_text(out("truth")), read_text(data() + "/groundtruth_cam0.tum"));
+  EXPECT_EQ(read_text(rig), read_text(data() + "/rig.yaml"));
+  EXPECT_EQ(read_text(notes), "precious");
+}
+
+TEST_F(CommandLine, AnOutputOfTheSameKindIsReplacedWithOverwrite) {
+  const std::string truth = data() + "/groundtruth_cam0.tum";
+  for (const std::string& command : {"inspect " + data() + " --frame 0 --out " + out("again.json"),
+                                     "rig info " + data() + " --svg " + out("rig.svg"),
+                                     "eval " + truth + " " + truth + " --plot " + out("again.svg")}) {
+    EXPECT_EQ(run(command).status, 0) << command;
+    expect_rejected(command);
+    EXPECT_EQ(run(command + " --overwrite").status, 0) << command;
+  }
+}
+
+TEST_F(CommandLine, AnExportDoesNotReplaceItsMap) {
+  const std::string map = out("own.bmap"), linked = out("linked.bmap"), before_link = out("behind.bmap");
+  fs::create_symlink(before_link, linked);
+  summary_of("exported_map", "--cameras 0,1 --save-map " + linked);
+  EXPECT_TRUE(fs::is_symlink(linked));  // its target was written
+  fs::copy_file(before_link, map);
+  const std::string bytes = read_text(map);
+  support::write_text(out("poem.ply"), "precious");
+  for (const char* format : {"ply", "g2o", "octomap"}) {
+    const std::string command = "map export " + map + " --format " + format + " --overwrite --out ";
+    expect_rejected(command + map);
+    EXPECT_NE(run(command + map).err.find("found a file that this command reads"), std::string::npos) << format;
+    expect_rejected(command + out("poem.ply"));
+    const std::string file = out(std::string("of_map.") + format);
+    for (int k = 0; k < 2; ++k) EXPECT_EQ(run(command + file).status, 0) << format;
+  }
+  expect_rejected("map merge " + map + " --overwrite --out " + out("poem.ply"));
+  expect_rejected("map transfer " + out("exported_map/trajectory.tum") + " --from " + map + " --to " + map +
+                  " --overwrite --out " + map);
+  EXPECT_EQ(read_text(map), bytes);
+  EXPECT_EQ(read_text(out("poem.ply")), "precious");
+  summary_of("exported_map", "--cameras 0,1 --end 0.5 --overwrite --save-map " + linked);
+  EXPECT_TRUE(fs::is_symlink(linked));
+  EXPECT_NE(read_text(before_link), bytes);
+}
+
+TEST_F(CommandLine, NumbersAreFinite) {
+  const std::string base = "run " + data() + " --out " + out("rejected");
+  const std::vector<std::string> all = {base + " --rate nan",
+                                        base + " --begin nan",
+                                        base + " --end inf",
+                                        base + " --end 1e999",
+                                        "eval a b --max-dt nan",
+                                        "eval a b --delta nan",
+                                        "map export m --out x --resolution nan",
+                                        "map export m --out x --max-range nan",
+                                        "map export m --out x --height nan 1",
+                                        "map export m --out x --height -inf 1",
+                                        "live --duration nan",
+                                        "live --fps nan",
+                                        "bench " + data() + " --time --margin nan",
+                                        "simulate --out x --duration inf",
+                                        "simulate --out x --noise nan",
+                                        "rig calibrate " + data() + " --out x --model pinhole --fov nan"};
+  for (const std::string& arguments : all) {
+    const Ran ran = run(arguments);
+    EXPECT_EQ(ran.status, 2) << arguments;
+    EXPECT_TRUE(ran.err.starts_with("bslam: command line: --")) << arguments << ": " << ran.err;
+    EXPECT_TRUE(ran.err.ends_with(", expected a finite number\n")) << arguments << ": " << ran.err;
+  }
+  EXPECT_NE(run("eval a b --max-dt inf").err.find("--max-dt: found inf, expected a number from 0 to 1000000\n"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace bslam
