@@ -34,7 +34,7 @@ struct EvalArguments {
   double delta_s = 1.0;
   std::optional<int> camera;
   std::optional<std::filesystem::path> rig, plot, times;
-  bool json = false, overwrite = false;
+  bool json = false;
 };
 
 AlignMode align_mode(const std::string& name) {
@@ -60,7 +60,7 @@ Status check_plot(const EvalArguments& a) {
   const Status other =
       check_not_input(*a.plot, "--plot", {a.estimate, a.ground_truth, a.rig.value_or(""), a.times.value_or("")});
   if (!other) return other;
-  return check_output_file(*a.plot, "--plot", a.overwrite, "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<svg ");
+  return check_output_file(*a.plot, "--plot", true, "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<svg ");
 }
 
 // Returns T_cam_frame of the frame of the ground truth and of the camera of the estimate; nullopt if both paths are in
@@ -222,7 +222,6 @@ void add_eval(CLI::App& app, int& exit_status) {
                    "time stamps of KITTI poses, one per line; default: times.txt in their folder");
   verb->add_flag("--json", arguments->json, "JSON instead of a table");
   verb->add_option("--plot", arguments->plot, "write an SVG with both paths and the error over time to this file");
-  verb->add_flag("--overwrite", arguments->overwrite, "replace an existing plot");
   verb->callback([arguments, &exit_status] { exit_status = run_eval(*arguments); });
 }
 

@@ -20,7 +20,6 @@ struct InspectArguments {
   ConfigArguments config;
   std::string out;
   int frame = 0;
-  bool overwrite = false;
 };
 
 nlohmann::ordered_json to_json(const frame::BundledFrame& frame, const dataset::Dataset& dataset) {
@@ -50,7 +49,7 @@ nlohmann::ordered_json to_json(const frame::BundledFrame& frame, const dataset::
 // The file must not be one of the input, and is replaced only if it is of this kind.
 Status check_out(const InspectArguments& a) {
   if (Status s = check_not_input(a.out, "--out", {a.data.path, a.data.rig, a.config.file}); !s) return s;
-  return check_output_file(a.out, "--out", a.overwrite, "{\n \"time\"");
+  return check_output_file(a.out, "--out", true, "{\n \"time\"");
 }
 
 int inspect(const InspectArguments& arguments) {
@@ -85,7 +84,6 @@ void add_inspect(CLI::App& app, int& exit_status) {
   add_dataset_options(*verb, a->data);
   verb->add_option("--frame", a->frame, "index of the input frame, counted from 0")->required();
   verb->add_option("--out", a->out, "JSON file to write")->required();
-  verb->add_flag("--overwrite", a->overwrite, "replace an existing file");
   add_config_options(*verb, a->config);
   verb->callback([a, &exit_status] { exit_status = inspect(*a); });
 }

@@ -29,7 +29,7 @@ Status check_output_file(const std::string& file, const char* option, bool overw
     return Error{file, option, "an existing file", "a new name, or --overwrite"};
   if (std::filesystem::is_regular_file(path, error) && !begins_with(path, begin))
     return Error{file, option, "an existing file of another kind",
-                 "a new name; --overwrite replaces files of its kind"};
+                 "a new name, or that of a file of the kind that is written"};
   return check_writable(path);
 }
 

@@ -10,7 +10,7 @@
 
 namespace bslam::cli {
 
-// Checks whether the file can be written. An existing file is replaced only with --overwrite, and if it begins with
+// Checks whether the file can be written. An existing file is replaced only if `overwrite`, and if it begins with
 // `begin` or is empty: the name of another file was a mistake.
 Status check_output_file(const std::string& file, const char* option, bool overwrite, std::string_view begin);
 

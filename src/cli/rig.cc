@@ -19,7 +19,6 @@ struct ConvertArguments {
   std::vector<std::string> files;  // the last one is written
   std::string to;
   std::vector<std::string> drop;
-  bool overwrite = false;
 };
 
 std::string joined_formats() {
@@ -46,14 +45,13 @@ Result<camera::Rig> with_drops(camera::Rig rig, const std::vector<std::string>& 
 struct InfoArguments {
   session::RigReportRequest report;
   ImageArguments images;
-  bool overwrite = false;
 };
 
 int rig_info(const InfoArguments& arguments) {
   session::RigReportRequest request = arguments.report;
   if (!request.svg.empty()) {
     for (const Status& s : {check_not_input(request.svg, "--svg", {request.file, request.images}),
-                            check_output_file(request.svg, "--svg", arguments.overwrite, "<svg ")})
+                            check_output_file(request.svg, "--svg", true, "<svg ")})
       if (!s) return report_error(s.error());
   }
   if (const Status s = apply_image_options(arguments.images, request.recording); !s) return report_error(s.error());
@@ -97,7 +95,6 @@ void add_info(CLI::App& rig, int& exit_status) {
   info->add_option("FILE", request->file, "a calibration, or the folder of a data set")->required();
   info->add_flag("--json", request->json, "print JSON");
   info->add_option("--svg", request->svg, "write a drawing of the rig from above and from the side to this SVG file");
-  info->add_flag("--overwrite", arguments->overwrite, "replace an existing drawing");
   info->add_option("--images", request->images, "test the extrinsics against the images of this data set");
   add_image_options(*info, arguments->images);
   info->callback([arguments, &exit_status] { exit_status = rig_info(*arguments); });
