@@ -19,6 +19,7 @@ struct ConvertArguments {
   std::vector<std::string> files;  // the last one is written
   std::string to;
   std::vector<std::string> drop;
+  bool overwrite = false;
 };
 
 std::string joined_formats() {
