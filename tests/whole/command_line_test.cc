@@ -54,14 +54,17 @@ TEST_F(CommandLine, ARunSaysWhichFolderIsWhichCamera) {
   std::string named = "cameras: ", ordered = "cameras: ";
   for (std::size_t c = 0; c < rig.size(); ++c) {
     const fs::path images = fs::path(data()) / "mav0" / ("cam" + std::to_string(c)) / "data";
-    const std::string &name = rig.camera(c).name, by_name = out("named/" + name),
+    const std::string &name = rig.camera(c).name, by_name = out("by_name/" + name),
                       other = out("other/image_" + std::to_string(c + 8));
-    for (const std::string& folder : {by_name, other}) fs::copy(images, folder, fs::copy_options::recursive);
+    for (const std::string& folder : {by_name, other}) {
+      fs::create_directories(folder);
+      fs::copy(images, folder, fs::copy_options::recursive);
+    }
     named += (c == 0 ? "" : ", ") + name + " = " + by_name;
     ordered += (c == 0 ? "" : ", ") + name + " = " + other;
   }
   const std::string more = " --rig " + data() + "/rig.yaml --end 0.2 --no-report --progress never --out ";
-  const Ran of_named = run("run " + out("named") + more + out("of_named"));
+  const Ran of_named = run("run " + out("by_name") + more + out("of_named"));
   EXPECT_TRUE(of_named.err.starts_with(named + " (by their names)\n")) << of_named.err;
   const Ran of_other = run("run " + out("other") + more + out("of_other"));
   EXPECT_TRUE(of_other.err.starts_with(ordered + " (in the order of their names; choose with --topics)\n"))
