@@ -15,8 +15,6 @@
 namespace bslam::cli {
 namespace {
 
-constexpr std::string_view kEmptyValue = "empty value";
-
 // Returns the innermost command that was recognised: for `bslam map info`, this is `info`.
 const CLI::App& chosen(const CLI::App& app) {
   const auto verbs = app.get_subcommands();
@@ -124,17 +122,6 @@ std::optional<Error> value_error(const CLI::App& verb, const std::string& text) 
 }
 
 }  // namespace
-
-void refuse_empty_values(CLI::App& app) {
-  app.parse_complete_callback([&app] {
-    for (const CLI::Option* option : app.get_options()) {
-      const bool may_lack_value = option->get_items_expected_min() == 0;
-      if (!may_lack_value && std::ranges::any_of(option->results(), &std::string::empty))
-        throw CLI::ValidationError(option->get_name(), std::string(kEmptyValue));
-    }
-  });
-  for (CLI::App* verb : app.get_subcommands([](const CLI::App*) { return true; })) refuse_empty_values(*verb);
-}
 
 Error command_line_error(const CLI::App& app, const CLI::ParseError& error) {
   const CLI::App& verb = chosen(app);

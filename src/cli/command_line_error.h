@@ -8,12 +8,8 @@
 
 namespace bslam::cli {
 
-// Makes empty values of options and arguments errors, in this command and those below it. They come from variables of a
-// shell that are not set, and would count as options that were not given.
-void refuse_empty_values(CLI::App& app);
-
-// Follows "Value ..." in the message of a check for numbers that are not finite.
-constexpr std::string_view kNotFinite = " is not finite";
+// Messages of cli/option_values.h for the value of an option; the second one follows "Value ...".
+constexpr std::string_view kEmptyValue = "empty value", kNotFinite = " is not finite";
 
 // Names the first unknown command or option, and suggests an existing one if its name is close. Other errors are
 // reported with the message of the parser.

@@ -6,7 +6,7 @@
 #endif
 
 #include "cli/command_line_error.h"
-#include "cli/finite_numbers.h"
+#include "cli/option_values.h"
 #include "cli/verbs.h"
 #include "cli/version.h"
 
@@ -36,8 +36,7 @@ int main(int argc, char** argv) {
   add_serve(app, exit_status);
   add_fleet(app, exit_status);
   add_settings(app, exit_status);
-  refuse_empty_values(app);
-  refuse_infinite_numbers(app);
+  check_option_values(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

@@ -7,6 +7,7 @@
 
 #include "base/atomic_file.h"
 #include "base/number_text.h"
+#include "dataset/image_names.h"
 #include "dataset/listed_images.h"
 #include "dataset/recording.h"
 #include "rig_formats/euroc_sensor.h"
@@ -73,7 +74,8 @@ class EurocRecording : public Recording {
     auto images = parse_list(file, *text, folders_[camera] / "data");
     if (!images) return images.error();
     if (images->empty()) return Error{file.string(), "", "no images", "one line timestamp,filename per image"};
-    return listed_images(*std::move(images), file, folders_[camera] / "data", image_files::StampUnit::kOfFile);
+    const fs::path folder = folders_[camera] / "data";
+    return listed_images(*std::move(images), file, folder, image_files_of(folder), image_files::StampUnit::kOfFile);
   }
 
   std::optional<fs::path> ground_truth() const override {

@@ -69,7 +69,8 @@ bool may_be_in(const CameraFolder& camera, const fs::path& name) {
 }
 
 // Times of images that the list names. One list may name those of several folders.
-Result<CameraImages> with_named_times(const TimeList& list, const CameraFolder& camera) {
+Result<CameraImages> with_named_times(const TimeList& list, const std::vector<fs::path>& files,
+                                      const CameraFolder& camera) {
   const fs::path& folder = camera.images;
   std::vector<image_files::ImageFile> images;
   for (std::size_t k = 0; k < list.names.size(); ++k) {
@@ -81,7 +82,7 @@ Result<CameraImages> with_named_times(const TimeList& list, const CameraFolder& 
     return Error{list.file.string(), "", "no image of " + folder.string(),
                  "lines of TIME FILENAME for the images in it"};
   }
-  return CameraImages{.list = listed_images(std::move(images), list.file, folder, unit_of(list)),
+  return CameraImages{.list = listed_images(std::move(images), list.file, folder, files, unit_of(list)),
                       .times_from = list.file.filename().string()};
 }
 
@@ -118,8 +119,8 @@ Result<CameraImages> read_camera(const CameraFolder& camera, const fs::path& dat
   const auto list = read_time_list(**file, stamps.unit_ns.has_value());
   if (!list) return list.error();
   if (list->names.empty() && !named) return named.error();
-  auto out =
-      list->names.empty() ? with_times(*list, *std::move(named), camera.images) : with_named_times(*list, camera);
+  auto out = list->names.empty() ? with_times(*list, *std::move(named), camera.images)
+                                 : with_named_times(*list, files, camera);
   if (out) out->unit_is_known = !stamps.unit_ns;
   return out;
 }

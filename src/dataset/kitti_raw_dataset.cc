@@ -11,6 +11,7 @@
 
 #include "base/atomic_file.h"
 #include "base/number_text.h"
+#include "dataset/image_names.h"
 #include "dataset/listed_images.h"
 #include "dataset/recording.h"
 #include "rig_formats/rig_file.h"
@@ -86,7 +87,8 @@ class KittiRawRecording : public Recording {
   }
 
   Result<image_files::ImageList> images(std::size_t camera) const override {
-    const fs::path folder = root_ / folder_name(cameras_[camera]), file = folder / "timestamps.txt";
+    const fs::path of_camera = root_ / folder_name(cameras_[camera]), folder = of_camera / "data",
+                   file = of_camera / "timestamps.txt";
     const auto text = read_text(file, kMaxListBytes);
     if (!text) return text.error();
     std::vector<image_files::ImageFile> images;
@@ -100,10 +102,10 @@ class KittiRawRecording : public Recording {
         return Error{file.string(), fmt::format("line {}", number + 1), line.substr(0, 60),
                      "a date such as 2011-09-26 13:02:25.964389445"};
       }
-      images.push_back({folder / "data" / fmt::format("{:010}.png", number), *time});
+      images.push_back({folder / fmt::format("{:010}.png", number), *time});
     }
     if (images.empty()) return Error{file.string(), "", "no times", "the date of every image"};
-    return listed_images(std::move(images), file, folder / "data", image_files::StampUnit::kSeconds);
+    return listed_images(std::move(images), file, folder, image_files_of(folder), image_files::StampUnit::kSeconds);
   }
 
  private:

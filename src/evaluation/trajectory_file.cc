@@ -48,7 +48,7 @@ std::string quoted(std::string_view text) {
 
 Result<std::string> read_bytes(const std::filesystem::path& file) {
   constexpr std::size_t kMaxBytes = std::size_t{1} << 32;  // 40 million poses
-  return read_file(file, kMaxBytes);
+  return read_text(file, kMaxBytes);
 }
 
 std::string_view trimmed(std::string_view text) {
@@ -82,7 +82,6 @@ bool is_csv_title(std::string_view line) {
 // Splits a file into lines of data, without comments, blank lines and the title line of a csv file.
 std::vector<Line> data_lines(std::string_view bytes) {
   std::vector<Line> lines;
-  if (bytes.starts_with("\xEF\xBB\xBF")) bytes.remove_prefix(3);
   for (std::size_t number = 1; !bytes.empty(); ++number) {
     const std::size_t end = std::min(bytes.find('\n'), bytes.size());
     const std::string_view line = trimmed(bytes.substr(0, end));
