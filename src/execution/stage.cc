@@ -72,15 +72,11 @@ std::vector<StageTask> following(const StageTask& task, const StageFunctions& fu
   return out;
 }
 
-std::vector<Stage> superseded_by(Stage stage) {
-  if (stage == Stage::kLoop) return {Stage::kCalibrate, Stage::kGlobal};
-  if (stage == Stage::kCalibrate) return {Stage::kGlobal};
-  return {};
-}
-
 std::vector<Stage> superseded_by(Stage stage, const StageResult& result, const map::BundledMap& newest) {
   if (!result.draft || result.draft->superseded(newest)) return {};
-  return superseded_by(stage);
+  if (stage == Stage::kCalibrate) return {Stage::kGlobal};
+  if (stage != Stage::kLoop) return {};
+  return result.draft->corrects() ? std::vector{Stage::kCalibrate, Stage::kGlobal} : std::vector{Stage::kGlobal};
 }
 
 }  // namespace bslam::execution

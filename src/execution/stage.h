@@ -73,11 +73,11 @@ bool before_first_calibration(KeyframeId keyframe);
 // calibrations are waited for as well. `newest` is the newest version of the map.
 bool awaited(const StageTask& task, const map::BundledMap& newest);
 
-// The stages whose waiting and running tasks are dropped when a result of `stage` is committed. A loop closure and a
-// calibration correct the map, so that a global adjustment of an earlier version is useless; they adjust the map
-// themselves or another adjustment follows. A loop closure also supersedes a calibration.
-std::vector<Stage> superseded_by(Stage stage);
-// The same before the commit of a result; `newest` is the newest version. Returns none if nothing will be committed.
+// The stages whose waiting and running tasks are dropped when a result of `stage` is committed; `newest` is the newest
+// version before the commit. After a loop closure or a calibration, a global adjustment of an earlier version is
+// useless; they adjust the map themselves or another adjustment follows. A loop closure also supersedes a calibration
+// of an earlier version if it moves the map and does not merely fuse landmarks. Returns none if nothing will be
+// committed.
 std::vector<Stage> superseded_by(Stage stage, const StageResult& result, const map::BundledMap& newest);
 
 // Report of one run of a stage for the observer.

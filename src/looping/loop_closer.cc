@@ -127,9 +127,12 @@ std::optional<LoopClosure> LoopCloser::close(KeyframeId keyframe, map::MapDraft&
                                    : close_loop(closure, place_match, options_.loop, features_, attempt);
   if (!done) return std::nullopt;
   draft = std::move(attempt);
-  history_ = {};
-  joined_.closed(keyframe);
   return closure;
+}
+
+void LoopCloser::committed(const LoopClosure& closure) {
+  history_ = {};
+  joined_.closed(closure.keyframe);
 }
 
 }  // namespace bslam::looping

@@ -39,7 +39,12 @@ class LoopCloser {
 
   // If `keyframe` (alive) closes a loop, writes the correction to the draft; otherwise leaves the draft unchanged.
   // Keyframes must come in order of their ids. `attempts` is updated with the results for candidates in other submaps.
+  // A draft with a closure must be committed before the next call; if its commit is rejected, the next keyframes can
+  // still close the loop.
   std::optional<LoopClosure> close(KeyframeId keyframe, map::MapDraft& draft, JoinAttempts* attempts = nullptr);
+
+  // Declares that the draft of a closure was committed.
+  void committed(const LoopClosure& closure);
 
   // Declares that the next keyframe does not continue the path of the previous ones.
   void begin_path() {

@@ -122,6 +122,7 @@ looping::JoinAttempts join(const std::vector<KeyframeId>& keyframes, looping::Lo
     const auto closure = closer.close(k, draft, &attempts);
     if (!closure) continue;
     store.commit(std::move(draft));
+    closer.committed(*closure);
     ++(closure->merged ? result.joined : result.loops);
   }
   return attempts;

@@ -25,7 +25,10 @@ execution::StageResult close_loop(looping::LoopCloser& closer, const LoopObserve
   if (!closure) return {};
   const auto time_of = [&](KeyframeId k) { return base->keyframe(k).frame->time_ns; };
   const LoopRecord record{*closure, time_of(closure->keyframe), time_of(closure->matched_keyframe)};
-  return {std::move(draft), [observer, record](const map::CommitReport&) { observer(record); }};
+  return {std::move(draft), [&closer, observer, record](const map::CommitReport&) {
+            closer.committed(record.closure);
+            observer(record);
+          }};
 }
 
 // The parameter of map_keyframe. A map that was loaded has been compared with its calibration.

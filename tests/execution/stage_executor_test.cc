@@ -100,30 +100,6 @@ std::size_t superseded(const Journal& journal) {
   return n;
 }
 
-TEST(Stage, OnlyACorrectionThatWillBeCommittedSupersedesOthers) {
-  const std::vector<Stage> none, corrections = {Stage::kCalibrate, Stage::kGlobal};
-  EXPECT_EQ(superseded_by(Stage::kLoop), corrections);
-  EXPECT_EQ(superseded_by(Stage::kCalibrate), std::vector{Stage::kGlobal});
-  EXPECT_EQ(superseded_by(Stage::kMap), none);
-  EXPECT_EQ(superseded_by(Stage::kGlobal), none);
-  map::MapStore store{StageWorld().empty_map()};
-  const StageResult nothing, loop{map::MapDraft(store.snapshot()), {}};
-  EXPECT_EQ(superseded_by(Stage::kLoop, nothing, *store.snapshot()), none);
-  EXPECT_EQ(superseded_by(Stage::kLoop, loop, *store.snapshot()), corrections);
-  EXPECT_EQ(superseded_by(Stage::kMap, loop, *store.snapshot()), none);
-}
-
-TEST(StageExecutor, FramesAwaitTheFirstCalibrations) {
-  const StageWorld world;
-  map::BundledMap empty = world.empty_map();
-  EXPECT_TRUE(awaited({Stage::kMap, KeyframeId(3)}, empty));
-  EXPECT_TRUE(awaited({Stage::kKeyframe, KeyframeId(), FrameId(3)}, empty));
-  EXPECT_TRUE(awaited({Stage::kCalibrate, KeyframeId(12)}, empty));
-  EXPECT_FALSE(awaited({Stage::kCalibrate, KeyframeId(18)}, empty));
-  EXPECT_FALSE(awaited({Stage::kLoop, KeyframeId(3)}, empty));
-  EXPECT_FALSE(awaited({Stage::kGlobal, KeyframeId(3)}, empty));
-}
-
 TEST(StageExecutorParallel, FramesUseTheFirstMapsAndCalibrations) {
   for (const Mode mode : kModes) {
     ExecutionSetup s = setup(hashing_stages(7));

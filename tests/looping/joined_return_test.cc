@@ -46,7 +46,10 @@ TEST_F(JoinedReturn, IsClosedAsALoop) {
   std::vector<LoopClosure> closed;
   for (int i = 0; i < kLapKeyframes + kAfter; ++i) {
     map::MapDraft draft = hall_map.draft();
-    if (const auto loop = closer.close(KeyframeId(i), draft)) closed.push_back(*loop);
+    const auto loop = closer.close(KeyframeId(i), draft);
+    if (!loop) continue;
+    closed.push_back(*loop);
+    closer.committed(*loop);
   }
   ASSERT_EQ(closed.size(), 1u);
   EXPECT_GE(closed.front().keyframe.value(), at.front());

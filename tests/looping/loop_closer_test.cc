@@ -29,6 +29,7 @@ class LoopCloserRun {
     map::MapDraft draft = world.draft();
     closure = closer_.close(k, draft);
     if (closure) {
+      if (committed) closer_.committed(*closure);
       corrected = draft.map();
     } else {
       EXPECT_TRUE(std::move(draft).finish().edit.operations.empty());
@@ -36,6 +37,7 @@ class LoopCloserRun {
     return !closure;
   }
 
+  bool committed = true;  // whether a closure will be committed
   std::optional<LoopClosure> closure;
   std::optional<map::BundledMap> corrected;
 
@@ -84,6 +86,17 @@ TEST(LoopCloser, RequiresTheConfiguredNumberOfConsecutiveKeyframes) {
   LoopingOptions single;
   single.loop.consistent_keyframes = 1;
   EXPECT_FALSE(LoopCloserRun(single)(world, KeyframeId(kLapKeyframes)));
+}
+
+TEST(LoopCloser, FindsALoopAgainWhoseCommitWasRejected) {
+  const HallMap world = simulate_lap(hall(rig_of(2)), 3, rigid_drift());
+  for (const bool committed : {true, false}) {
+    LoopCloserRun run;
+    run.committed = committed;
+    EXPECT_TRUE(run(world, KeyframeId(kLapKeyframes)));
+    EXPECT_FALSE(run(world, KeyframeId(kLapKeyframes + 1)));
+    EXPECT_EQ(run(world, KeyframeId(kLapKeyframes + 2)), committed);
+  }
 }
 
 TEST(LoopCloser, ClosesNothingWithoutARevisit) {

@@ -1,0 +1,44 @@
+#include "execution/stage.h"
+
+#include <gtest/gtest.h>
+
+#include "execution/stage_world.h"
+
+namespace bslam::execution {
+namespace {
+
+TEST(Stage, OnlyAResultThatWillBeCommittedSupersedesOthers) {
+  const std::vector<Stage> none, global = {Stage::kGlobal}, all = {Stage::kCalibrate, Stage::kGlobal};
+  const StageWorld world;
+  map::MapStore store{world.empty_map()};
+  store.commit(world.with_keyframe(FrameId(0), store.snapshot()));
+  const auto superseded = [&](Stage stage, const StageResult& result) {
+    return superseded_by(stage, result, *store.snapshot());
+  };
+  const StageResult nothing, fusion{map::MapDraft(store.snapshot()), {}};
+  StageResult correction = fusion;
+  ASSERT_TRUE(correction.draft->scale_submap(KeyframeId(0), 2));
+  EXPECT_EQ(superseded(Stage::kLoop, nothing), none);
+  EXPECT_EQ(superseded(Stage::kLoop, fusion), global);
+  EXPECT_EQ(superseded(Stage::kLoop, correction), all);
+  EXPECT_EQ(superseded(Stage::kCalibrate, correction), global);
+  EXPECT_EQ(superseded(Stage::kMap, correction), none);
+  EXPECT_EQ(superseded(Stage::kGlobal, correction), none);
+  map::MapDraft other = *correction.draft;
+  store.commit(std::move(other));
+  EXPECT_EQ(superseded(Stage::kLoop, correction), none);  // its commit will be rejected
+}
+
+TEST(Stage, FramesAwaitTheFirstCalibrations) {
+  const StageWorld world;
+  map::BundledMap empty = world.empty_map();
+  EXPECT_TRUE(awaited({Stage::kMap, KeyframeId(3)}, empty));
+  EXPECT_TRUE(awaited({Stage::kKeyframe, KeyframeId(), FrameId(3)}, empty));
+  EXPECT_TRUE(awaited({Stage::kCalibrate, KeyframeId(12)}, empty));
+  EXPECT_FALSE(awaited({Stage::kCalibrate, KeyframeId(18)}, empty));
+  EXPECT_FALSE(awaited({Stage::kLoop, KeyframeId(3)}, empty));
+  EXPECT_FALSE(awaited({Stage::kGlobal, KeyframeId(3)}, empty));
+}
+
+}  // namespace
+}  // namespace bslam::execution
