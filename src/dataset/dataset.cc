@@ -247,8 +247,7 @@ Status use_masks(const DatasetRequest& request, const Recording& recording, Chos
   auto masked = with_masks(chosen.rig, chosen.cameras, *request.masks);
   if (!masked) return masked.error();
   chosen.rig = *std::move(masked);
-  const auto unused =
-      masks_of_no_camera(*request.masks, chosen.whole ? chosen.whole->size() : recording.camera_count());
+  const auto unused = masks_not_used(*request.masks, chosen.whole ? chosen.whole->size() : recording.camera_count());
   chosen.warnings.insert(chosen.warnings.end(), unused.begin(), unused.end());
   return {};
 }

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cstdint>
 #include <map>
+#include <optional>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -17,7 +19,18 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string name_of(int camera) { return fmt::format("cam{}", camera); }
+constexpr std::string_view kCamera = "cam", kExtension = ".png";
+
+std::string name_of(int camera) { return fmt::format("{}{}", kCamera, camera); }
+
+// The number of the camera to whose masks a file or a folder belongs by its name.
+std::optional<std::uint64_t> number_of(std::string_view name, bool is_folder) {
+  if (!is_folder && !name.ends_with(kExtension)) return std::nullopt;
+  const std::string_view stem = name.substr(0, name.size() - (is_folder ? 0 : kExtension.size()));
+  const auto number = stem.starts_with(kCamera) ? parse_integer(stem.substr(kCamera.size())) : std::nullopt;
+  if (!number || *number < 0 || stem.substr(kCamera.size()) != std::to_string(*number)) return std::nullopt;
+  return static_cast<std::uint64_t>(*number);
+}
 
 }  // namespace
 
@@ -29,7 +42,7 @@ Result<camera::Rig> with_masks(const camera::Rig& rig, const std::vector<int>& c
   bool any = false;
   for (std::size_t i = 0; i < rig.size(); ++i) {
     camera::Camera camera = rig.camera(i);
-    const fs::path file = folder / (name_of(cameras[i]) + ".png");
+    const fs::path file = folder / fmt::format("{}{}", name_of(cameras[i]), kExtension);
     any |= fs::is_directory(folder / name_of(cameras[i]), error);
     if (fs::exists(file, error)) {
       camera.mask_file = file.string();
@@ -45,20 +58,30 @@ Result<camera::Rig> with_masks(const camera::Rig& rig, const std::vector<int>& c
   return camera::Rig(std::move(masked), rig.cam_from_rig(0));
 }
 
-std::vector<std::string> masks_of_no_camera(const fs::path& folder, std::size_t count) {
-  std::vector<std::string> names;
+std::vector<std::string> masks_not_used(const fs::path& folder, std::size_t count) {
+  std::vector<std::string> of_no_camera, others;
   std::error_code error;
   for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
-    const std::string stem = it->path().stem().string(), extension = it->path().extension().string();
-    if (!stem.starts_with("cam") || !(extension.empty() || extension == ".png")) continue;
-    const auto number = parse_integer(stem.substr(3));
-    if (number && (*number < 0 || static_cast<std::uint64_t>(*number) >= count))
-      names.push_back(it->path().filename().string());
+    std::error_code unknown;
+    const bool is_folder = it->is_directory(unknown);
+    if (!(is_folder ? !image_files::images_in(*it).empty() : image_files::is_image_name(*it))) continue;
+    const std::string name = it->path().filename().string();
+    const auto number = number_of(name, is_folder);
+    if (!number) others.push_back(name);
+    if (number && *number >= count) of_no_camera.push_back(name);
   }
-  if (names.empty()) return {};
-  std::ranges::sort(names);
-  return {fmt::format("{}: {} are masks of no camera, since there are {} (cam0 is the first)", folder.string(),
-                      fmt::join(names, ", "), count)};
+  std::ranges::sort(of_no_camera);
+  std::ranges::sort(others);
+  std::vector<std::string> warnings;
+  if (!of_no_camera.empty()) {
+    warnings.push_back(fmt::format("{}: {} are masks of no camera, since there are {} (cam0 is the first)",
+                                   folder.string(), fmt::join(of_no_camera, ", "), count));
+  }
+  if (!others.empty()) {
+    warnings.push_back(fmt::format("{}: {} not used, since masks are named camN.png or camN/STAMP.png", folder.string(),
+                                   fmt::join(others, ", ")));
+  }
+  return warnings;
 }
 
 Result<std::vector<std::string>> add_image_masks(const fs::path& folder, int number, const camera::Camera& camera,

@@ -20,8 +20,9 @@ namespace bslam::dataset {
 Result<camera::Rig> with_masks(const camera::Rig& rig, const std::vector<int>& cameras,
                                const std::filesystem::path& folder);
 
-// Returns a warning if the folder has masks of cameras beyond the `count` of the calibration.
-std::vector<std::string> masks_of_no_camera(const std::filesystem::path& folder, std::size_t count);
+// Returns warnings for images in the folder that are no masks by their names, or masks of cameras beyond the `count` of
+// the calibration.
+std::vector<std::string> masks_not_used(const std::filesystem::path& folder, std::size_t count);
 
 // Adds the masks of single images of camera `number` to its images, whose times are the recorded ones in ns. STAMP is
 // this time or the number by which the image's file is named. Returns warnings for the user, if masks belong to no

@@ -73,10 +73,21 @@ TEST_F(MaskFolder, MasksOfNoCameraAreReported) {
   support::write_image(masks() / "cam1.png", support::kSmallWidth, support::kSmallHeight);
   support::write_image(masks() / "cam2.png", support::kSmallWidth, support::kSmallHeight);
   std::filesystem::create_directories(masks() / "cam7");
+  support::write_image(masks() / "cam7" / "12.png", support::kSmallWidth, support::kSmallHeight);
   const auto dataset = open({1});  // the mask of camera 0 would be one of the rig
   ASSERT_TRUE(dataset) << dataset.error().message();
   ASSERT_EQ(dataset->warnings.size(), 1u);
   EXPECT_NE(dataset->warnings[0].find("cam2.png, cam7 are masks of no camera, since there are 2"), std::string::npos);
+}
+
+TEST_F(MaskFolder, ImagesWithOtherNamesAreReported) {
+  for (const char* name : {"cam0.png", "cam01.png", "cam1.jpg", "mask.png"})
+    support::write_image(masks() / name, support::kSmallWidth, support::kSmallHeight);
+  support::write_text(masks() / "notes.txt", "masks of people");
+  const auto dataset = open({0, 1});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  ASSERT_EQ(dataset->warnings.size(), 1u);
+  EXPECT_NE(dataset->warnings[0].find("cam01.png, cam1.jpg, mask.png not used"), std::string::npos);
 }
 
 TEST_F(MaskFolder, AnImageWhoseMaskCannotBeReadIsDamaged) {
