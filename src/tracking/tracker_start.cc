@@ -9,7 +9,7 @@ namespace {
 using frame::BundledFrame;
 
 constexpr int kMetricAttempts = 5;  // frames in which only metric initialisation is attempted if cameras overlap
-constexpr int kMaxStartAge = 40;    // maximum age in frames of the reference frame of a monocular initialisation
+constexpr int kMaxStartAge = 100;    // maximum age in frames of the reference frame of a monocular initialisation
 
 // Number of landmarks of a keyframe observed by each camera.
 std::vector<int> landmarks_by_camera(const map::BundledKeyframe& keyframe) {
