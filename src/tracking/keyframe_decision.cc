@@ -1,6 +1,10 @@
 #include "tracking/keyframe_decision.h"
 
 #include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <map>
 
 #include "base/median.h"
 #include "geometry/triangulation.h"
@@ -11,8 +15,6 @@
 namespace bslam::tracking {
 namespace {
 
-// Close-point rule of ORB-SLAM2 (Mur-Artal & Tardos, T-RO 2017): numbers of features with accurate depth.
-constexpr int kMinTrackedClose = 100, kMinUntrackedClose = 70;
 constexpr double kRestMaxParallax = 0.01;  // rad; a rig at rest has a smaller parallax
 constexpr double kRestMinOverlap = 0.95;
 // Minimum number of tracked landmarks; with fewer, the scene may have changed.
@@ -21,18 +23,30 @@ constexpr double kMinShared = 0.6;        // minimum fraction of the inliers tha
 constexpr std::size_t kNewest = 5;        // number of newest keyframes that do not count as a return
 constexpr double kSimilarParallax = 0.5;  // maximum parallax to it, relative to that of a new keyframe
 
-bool untracked_depth(const frame::BundledFrame& frame, const FrameMatches& inliers,
-                     const InitialisationOptions& options) {
+// Close-point rule of ORB-SLAM2 (Mur-Artal & Tardos, T-RO 2017).
+bool untracked_depth(const frame::BundledFrame& frame, const FrameMatches& inliers, const TrackingOptions& options) {
   std::vector<std::uint8_t> tracked(frame.bundled.size(), 0);
   for (std::size_t c = 0; c < inliers.size(); ++c) {
     for (const Match& m : inliers[c]) tracked[frame.bundled.feature(CameraIndex(c), m.keypoint).index()] = 1;
   }
   int num_tracked = 0, num_untracked = 0;
   for (std::size_t f = 0; f < frame.bundled.num_matched(); ++f) {
-    if (!has_accurate_depth(frame.bundled.point(FeatureId(f)), options)) continue;
+    if (!has_accurate_depth(frame.bundled.point(FeatureId(f)), options.initialisation)) continue;
     ++(tracked[f] ? num_tracked : num_untracked);
   }
-  return num_tracked < kMinTrackedClose && num_untracked > kMinUntrackedClose;
+  return num_tracked < options.keyframe.min_tracked_close && num_untracked > options.keyframe.max_untracked_close;
+}
+
+FrameMatches only(const FrameMatches& matches, std::span<const std::uint8_t> cameras) {
+  FrameMatches out(matches.size());
+  for (std::size_t c = 0; c < matches.size(); ++c) {
+    if (cameras[c]) out[c] = matches[c];
+  }
+  return out;
+}
+
+bool present(const frame::BundledFrame& frame, std::size_t camera) {
+  return frame.cameras[camera].state == image::ImageState::kPresent;
 }
 
 bool observes(const map::BundledMap& map, KeyframeId k, LandmarkId l) {
@@ -69,7 +83,7 @@ double share_in_view(const map::BundledMap& map, KeyframeId keyframe, const fram
   const camera::Rig& rig = map.rig();
   const auto in_view = [&](const Eigen::Vector3d& p_rig) {
     for (std::size_t c = 0; c < rig.size(); ++c) {
-      if (frame.cameras[c].state != image::ImageState::kPresent) continue;
+      if (!present(frame, c)) continue;
       const auto pixel = rig.camera(c).project(rig.cam_from_rig(c) * p_rig);
       if (pixel && rig.camera(c).contains(*pixel)) return true;
     }
@@ -81,6 +95,36 @@ double share_in_view(const map::BundledMap& map, KeyframeId keyframe, const fram
     seen += in_view(T_rig_world * map.landmark(l).position);
   }
   return landmarks > 0 ? static_cast<double>(seen) / landmarks : 0.0;
+}
+
+// The fraction of the landmarks that a camera observes in a keyframe and that are in its image at the pose; 1 without
+// any.
+double share_in_image(const map::BundledMap& map, KeyframeId keyframe, std::size_t camera,
+                      const geometry::SE3& T_rig_world) {
+  const map::BundledKeyframe& then = map.keyframe(keyframe);
+  const geometry::SE3 T_cam_world = map.rig().cam_from_rig(camera) * T_rig_world;
+  int landmarks = 0, seen = 0;
+  for (std::size_t f = 0; f < then.landmarks.size(); ++f) {
+    const auto keypoints = then.frame->bundled.keypoints(FeatureId(f));
+    const bool by_camera = std::ranges::any_of(keypoints, [&](const auto& k) { return k.camera.index() == camera; });
+    if (!by_camera || !then.landmarks[f].valid()) continue;
+    const auto pixel = map.rig().camera(camera).project(T_cam_world * map.landmark(then.landmarks[f]).position);
+    ++landmarks;
+    seen += pixel && map.rig().camera(camera).contains(*pixel);
+  }
+  return landmarks > 0 ? static_cast<double>(seen) / landmarks : 1.0;
+}
+
+// Updates the maximum overlap of a camera. Its first image since the keyframe may be a late one, when a part of the
+// landmarks has left the image; the maximum is then what it would have been.
+void update_best(const map::BundledMap& map, std::size_t camera, int overlap, const geometry::SE3& T_rig_world,
+                 double min_overlap, KeyframeId reference, int& best) {
+  if (best > 0 || overlap == 0) {
+    best = std::max(best, overlap);
+    return;
+  }
+  const double share = share_in_image(map, reference, camera, T_rig_world);
+  best = share < min_overlap ? static_cast<int>(std::lround(overlap / std::max(share, 0.1))) : overlap;
 }
 
 }  // namespace
@@ -97,20 +141,59 @@ std::vector<int> overlap_by_camera(const map::BundledMap& map, const FrameMatche
 
 KeyframeEvidence keyframe_evidence(const map::BundledMap& map, const frame::BundledFrame& frame,
                                    const FrameMatches& inliers, KeyframeId reference, const geometry::SE3& T_rig_world,
-                                   const TrackingOptions& options) {
+                                   const TrackingOptions& options, std::span<const std::uint8_t> cameras) {
   KeyframeEvidence evidence;
-  std::vector<double> parallaxes = parallaxes_to(map, landmarks_of(inliers), reference, T_rig_world.inverse(),
-                                                 map.resolved_pose(reference).inverse());
+  const std::vector<LandmarkId> landmarks = landmarks_of(cameras.empty() ? inliers : only(inliers, cameras));
+  std::vector<double> parallaxes =
+      parallaxes_to(map, landmarks, reference, T_rig_world.inverse(), map.resolved_pose(reference).inverse());
   evidence.overlap = static_cast<int>(parallaxes.size());
   if (!parallaxes.empty()) evidence.parallax = median(std::move(parallaxes));
   for (std::size_t c = 0; c < inliers.size(); ++c) {
+    if (!cameras.empty() && cameras[c] == 0) continue;
     const auto keypoints = static_cast<double>(frame.cameras[c].keypoints.size());
     const auto found = static_cast<double>(inliers[c].size());
     evidence.camera_with_few_inliers |=
         found < options.keyframe.min_camera_inliers && found < options.keyframe.min_camera_inlier_ratio * keypoints;
   }
-  evidence.untracked_depth = untracked_depth(frame, inliers, options.initialisation);
+  evidence.untracked_depth = untracked_depth(frame, inliers, options);
   return evidence;
+}
+
+std::vector<KeyframeEvidence> evidence_by_reference(const map::BundledMap& map, const frame::BundledFrame& frame,
+                                                    const FrameMatches& inliers, const geometry::SE3& T_rig_world,
+                                                    const TrackingOptions& options, int CameraReference::*best,
+                                                    std::vector<CameraReference>& references) {
+  std::map<KeyframeId, std::vector<std::uint8_t>, std::greater<>> cameras;  // by reference, the newest one first
+  for (std::size_t c = 0; c < inliers.size(); ++c) {
+    if (!present(frame, c)) continue;
+    auto& of_reference = cameras[map.nearest_alive_ancestor(references[c].keyframe)];
+    of_reference.resize(inliers.size());
+    of_reference[c] = 1;
+  }
+  std::vector<KeyframeEvidence> out;
+  for (const auto& [reference, compared] : cameras) {
+    KeyframeEvidence e = keyframe_evidence(map, frame, inliers, reference, T_rig_world, options, compared);
+    const std::vector<int> overlap = overlap_by_camera(map, inliers, reference);
+    e.overlap = 0;
+    e.frames_since_keyframe = std::numeric_limits<int>::max();
+    for (std::size_t c = 0; c < overlap.size(); ++c) {
+      if (!compared[c]) continue;
+      update_best(map, c, overlap[c], T_rig_world, options.keyframe.min_overlap, reference, references[c].*best);
+      e.overlap += overlap[c];
+      e.best_overlap += references[c].*best;
+      e.frames_since_keyframe = std::min(e.frames_since_keyframe, references[c].frames);
+    }
+    // Cameras that hardly see anything, such as dark ones, would ask for a keyframe in each of their images.
+    if (out.empty() || e.best_overlap >= options.consensus.min_expected) out.push_back(e);
+  }
+  return out;
+}
+
+void refer_to(KeyframeId keyframe, const frame::BundledFrame& frame, std::vector<CameraReference>& references) {
+  references.resize(frame.cameras.size());
+  for (std::size_t c = 0; c < references.size(); ++c) {
+    if (present(frame, c) || !references[c].keyframe.valid()) references[c] = {keyframe};
+  }
 }
 
 bool keyframe_due(const KeyframeEvidence& e, const KeyframeOptions& options) {

@@ -2,7 +2,10 @@
 // so that results are deterministic.
 #pragma once
 
+#include <cstdint>
 #include <optional>
+#include <span>
+#include <vector>
 
 #include "map/bundled_map.h"
 #include "tracking/frame_matches.h"
@@ -12,6 +15,18 @@ namespace bslam::tracking {
 // Number of frames after a keyframe after which a camera with few inliers makes the next one due; while tracking is
 // direct, the number of frames after which features are extracted because of such a camera.
 inline constexpr int kFewInliersInterval = 8;
+
+// The keyframe with which the frames of a camera are compared: the newest one with an image of the camera. It is that
+// of all cameras unless some of them have images less often. If the cameras shared one, a camera that has no image in
+// keyframes would look as if its view had not changed, and would get fewer and fewer landmarks.
+struct CameraReference {
+  KeyframeId keyframe;
+  int frames = 0;  // number of frames of the rig that were tracked since then
+  // Maximum number of the keyframe's landmarks that the camera has found in a frame since then: in frames with
+  // features, and in frames that were tracked directly.
+  int best_overlap = 0;
+  int best_direct_overlap = 0;
+};
 
 struct KeyframeEvidence {
   int frames_since_keyframe = 0;
@@ -25,9 +40,20 @@ struct KeyframeEvidence {
 };
 
 // Computes all members except the frame counts and the best overlap. `inliers`: matches of `frame` at `T_rig_world`.
+// `cameras`: nonzero for those that are compared with the reference; empty: all.
 KeyframeEvidence keyframe_evidence(const map::BundledMap& map, const frame::BundledFrame& frame,
                                    const FrameMatches& inliers, KeyframeId reference, const geometry::SE3& T_rig_world,
-                                   const TrackingOptions& options);
+                                   const TrackingOptions& options, std::span<const std::uint8_t> cameras = {});
+
+// The evidence for each reference keyframe of the cameras that have an image. `best` is the member of the references
+// that holds the maximum overlap for frames of this kind; it is updated.
+std::vector<KeyframeEvidence> evidence_by_reference(const map::BundledMap& map, const frame::BundledFrame& frame,
+                                                    const FrameMatches& inliers, const geometry::SE3& T_rig_world,
+                                                    const TrackingOptions& options, int CameraReference::*best,
+                                                    std::vector<CameraReference>& references);
+
+// Makes a keyframe the reference of the cameras that have an image in `frame`, and of those without any reference.
+void refer_to(KeyframeId keyframe, const frame::BundledFrame& frame, std::vector<CameraReference>& references);
 
 // Per camera: the number of inliers whose landmark the reference keyframe observes.
 std::vector<int> overlap_by_camera(const map::BundledMap& map, const FrameMatches& inliers, KeyframeId reference);

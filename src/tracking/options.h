@@ -43,6 +43,9 @@ struct KeyframeOptions {
   double max_parallax = 0.09;  // rad; a keyframe is inserted if the median parallax to the reference keyframe is larger
   int min_camera_inliers = 40;            // a keyframe is inserted if some camera has fewer inliers than this ...
   double min_camera_inlier_ratio = 0.15;  // ... and fewer than this fraction of its keypoints
+  // A keyframe is inserted if fewer features with accurate depth than this are tracked ...
+  int min_tracked_close = 100;
+  int max_untracked_close = 70;  // ... and more than this are not landmarks yet
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
@@ -62,6 +65,11 @@ struct KeyframeOptions {
     visitor("min_camera_inlier_ratio", self.min_camera_inlier_ratio, Range{0, 1}, "",
             "minimum ratio of inliers to keypoints of a camera with fewer than min_camera_inliers",
             OptionNote{.formerly = "starved_share"});
+    visitor("min_tracked_close", self.min_tracked_close, Range{0, 10000}, "",
+            "a keyframe is inserted if fewer features with accurate depth are tracked, and max_untracked_close is "
+            "exceeded");
+    visitor("max_untracked_close", self.max_untracked_close, Range{0, 10000}, "",
+            "maximum number of features with accurate depth that are no landmarks yet, with few tracked ones");
   }
 };
 

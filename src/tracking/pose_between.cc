@@ -39,10 +39,13 @@ std::optional<TrackResult> pose_between(const map::BundledMap& map, const Betwee
                                         ThreadPool& pool) {
   const KeyframeId before = map.nearest_alive_ancestor(early.before), after = map.nearest_alive_ancestor(early.after);
   if (!before.valid() || !after.valid()) return std::nullopt;
-  const frame::BundledFrame& frame = *early.frame;
+  frame::BundledFrame frame = *early.frame;
   const SE3 T_before = map.resolved_pose(early.before), T_after = map.resolved_pose(early.after);
   if (frame.time_ns == early.before_ns) return result_at(map, frame, T_before, before);
-  const double fraction = to_seconds(frame.time_ns - early.before_ns) / to_seconds(early.after_ns - early.before_ns);
+  const double between_s = to_seconds(early.after_ns - early.before_ns);
+  const double fraction = to_seconds(frame.time_ns - early.before_ns) / between_s;
+  frame.twist = (T_after * T_before.inverse()).log() / between_s;
+  const camera::Rig rig = frame::rig_of(map.rig(), frame);
   SE3 T = geometry::interpolate(T_before, T_after, fraction);
   const std::vector<LandmarkId> landmarks = landmarks_of_both(map, before, after);
   // The first search uses the interpolated pose, the second one the pose found by the first.
@@ -56,7 +59,7 @@ std::optional<TrackResult> pose_between(const map::BundledMap& map, const Betwee
                             .scale_factor = features.pyramid.scale_factor},
                            pool)
                 .found;
-    solution = solver::solve_pose(map.rig(), pose_observations(map, frame, found, features), T, options.pose);
+    solution = solver::solve_pose(rig, pose_observations(map, frame, found, features), T, options.pose);
     const auto needed = options.min_inlier_ratio * static_cast<double>(count(found));
     if (!solution.ok || solution.num_inliers < options.min_inliers || solution.num_inliers < needed)
       return std::nullopt;

@@ -24,7 +24,8 @@ feature::FeatureOptions reduced(feature::FeatureOptions options, int level) {
 TrackingOptions reduced(TrackingOptions options, int level) {
   const double share = work_share(level);
   for (int* count : {&options.direct.per_image, &options.direct.per_rig, &options.direct.min_per_image,
-                     &options.direct.coarse_per_image, &options.keyframe.min_camera_inliers}) {
+                     &options.direct.coarse_per_image, &options.keyframe.min_camera_inliers,
+                     &options.keyframe.min_tracked_close, &options.keyframe.max_untracked_close}) {
     *count = times(*count, share);
   }
   options.keyframe.min_interval = times(options.keyframe.min_interval, 1 / share);
@@ -37,8 +38,10 @@ TrackingOptions reduced(TrackingOptions options, int level) {
 void change_level(int from, int to, TrackerState& state) {
   if (to <= from) return;
   const double share = work_share(to) / work_share(from);
-  state.best_overlap = times(state.best_overlap, share);
-  for (int& best : state.best_direct_overlap) best = times(best, share);
+  for (CameraReference& r : state.references) {
+    r.best_overlap = times(r.best_overlap, share);
+    r.best_direct_overlap = times(r.best_direct_overlap, share);
+  }
   for (int& best : state.direct.best_inliers) best = times(best, share);
 }
 

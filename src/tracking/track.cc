@@ -290,14 +290,8 @@ TrackOutput tracked(const TrackInput& input, const Coarse& coarse, Fine&& fine, 
   TrackOutput out = output_of(input, {std::move(refined), std::move(fine.solution), std::move(fine.matches),
                                       std::move(fine.visible), fine.contest});
   update_cameras(coarse, fine, options.consensus, out);
-  TrackerState& state = out.state;
-  KeyframeEvidence evidence =
-      keyframe_evidence(input.map, out.frame, out.matches, state.anchored.reference, out.result.T_rig_world, options);
-  state.best_overlap = std::max(state.best_overlap, evidence.overlap);
-  evidence.best_overlap = state.best_overlap;
-  evidence.frames_since_keyframe = state.frames_since_keyframe;
-  out.keyframe_due = keyframe_needed(input.map, evidence, options.keyframe, out);
-  state.direct = {};
+  out.keyframe_due = keyframe_needed(input.map, options, &CameraReference::best_overlap, out);
+  out.state.direct = {};
   return out;
 }
 

@@ -11,6 +11,7 @@
 #include "map/map_edit.h"
 #include "tracking/camera_consensus.h"
 #include "tracking/frame_matches.h"
+#include "tracking/keyframe_decision.h"
 
 namespace bslam::tracking {
 
@@ -94,10 +95,7 @@ struct TrackerState {
   double twist_interval_s = 0;                // time between the two frames from which the twist was computed
   std::vector<LandmarkId> landmarks;          // inliers of the last tracked frame
   std::vector<CameraConsensusState> cameras;  // empty until a frame was tracked
-  int frames_since_keyframe = 0;
-  // Maximum number of landmarks of the reference keyframe that a frame since that keyframe has matched.
-  int best_overlap = 0;
-  std::vector<int> best_direct_overlap;  // per camera: the same maximum for frames that were tracked directly
+  std::vector<CameraReference> references;    // per camera
   DirectState direct;
   // Not yet added to the map; one for each landmark, sorted.
   std::vector<map::VisibilityCount> visibility_counts;
@@ -146,7 +144,7 @@ TrackOutput lost(const TrackerState& state, const frame::BundledFrame& frame, Lo
 void apply_scale_change(const map::BundledMap& map, TrackerState& state);
 
 // The state of tracking after `keyframe` was created from the frame of `time_ns`, which observes `landmarks`.
-TrackerState state_at_keyframe(const TrackerState& before, TimeNs time_ns, KeyframeId keyframe,
-                               std::vector<LandmarkId> landmarks);
+TrackerState state_at_keyframe(const TrackerState& before, TimeNs time_ns, const map::BundledMap& map,
+                               KeyframeId keyframe, std::vector<LandmarkId> landmarks);
 
 }  // namespace bslam::tracking

@@ -128,26 +128,9 @@ bool support_is_low(const frame::BundledFrame& frame, const FrameMatches& inlier
   return low;
 }
 
-// The overlap with the reference keyframe is summed over the cameras of this frame, and compared with the sum of their
-// largest values: it must not depend on which cameras have an image.
-bool needs_keyframe(const TrackInput& input, const TrackingOptions& options, TrackOutput& out) {
-  TrackerState& state = out.state;
-  KeyframeEvidence evidence =
-      keyframe_evidence(input.map, out.frame, out.matches, state.anchored.reference, out.result.T_rig_world, options);
-  const std::vector<int> overlap = overlap_by_camera(input.map, out.matches, state.anchored.reference);
-  std::vector<int>& best = state.best_direct_overlap;
-  best.resize(overlap.size());
-  evidence.overlap = evidence.best_overlap = 0;
-  for (std::size_t c = 0; c < overlap.size(); ++c) {
-    if (!used(out.frame, c)) continue;
-    best[c] = std::max(best[c], overlap[c]);
-    evidence.overlap += overlap[c];
-    evidence.best_overlap += best[c];
-  }
-  evidence.frames_since_keyframe = state.frames_since_keyframe;
-  KeyframeOptions keyframe = options.keyframe;
-  keyframe.min_overlap = std::max(keyframe.min_overlap, options.direct.min_overlap);
-  return keyframe_needed(input.map, evidence, keyframe, out);
+bool needs_keyframe(const TrackInput& input, TrackingOptions options, TrackOutput& out) {
+  options.keyframe.min_overlap = std::max(options.keyframe.min_overlap, options.direct.min_overlap);
+  return keyframe_needed(input.map, options, &CameraReference::best_direct_overlap, out);
 }
 
 bool predictable(const TrackInput& input, const frame::BundledFrame& frame) {

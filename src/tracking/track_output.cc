@@ -148,7 +148,7 @@ TrackOutput output_of(const TrackInput& input, TrackedFrame found) {
   state.landmarks = landmarks_of(out.matches);
   count_visibility(found.visible, state.landmarks, state.visibility_counts);
   state.cameras.resize(out.matches.size());
-  ++state.frames_since_keyframe;
+  for (CameraReference& r : state.references) ++r.frames;
   return out;
 }
 
@@ -165,18 +165,23 @@ void update_used_camera(const frame::BundledFrame& frame, std::size_t c, const s
   for (const Match& m : inliers) camera.landmarks.push_back(m.landmark);
 }
 
-bool keyframe_needed(const map::BundledMap& map, const KeyframeEvidence& evidence, const KeyframeOptions& options,
+bool keyframe_needed(const map::BundledMap& map, const TrackingOptions& options, int CameraReference::*best,
                      TrackOutput& out) {
-  if (!keyframe_due(evidence, options)) return false;
-  if (evidence.untracked_depth || evidence.camera_with_few_inliers) return true;
   TrackerState& state = out.state;
+  const std::vector<KeyframeEvidence> evidence =
+      evidence_by_reference(map, out.frame, out.matches, out.result.T_rig_world, options, best, state.references);
+  if (std::ranges::none_of(evidence, [&](const auto& e) { return keyframe_due(e, options.keyframe); })) return false;
+  const auto new_view = [](const KeyframeEvidence& e) { return e.untracked_depth || e.camera_with_few_inliers; };
+  if (std::ranges::any_of(evidence, new_view)) return true;
   const auto similar =
-      similar_keyframe(map, out.frame, out.matches, state.anchored.reference, out.result.T_rig_world, options);
+      similar_keyframe(map, out.frame, out.matches, state.anchored.reference, out.result.T_rig_world, options.keyframe);
   if (!similar) return true;
   state.anchored = map::AnchoredPose::at(map, *similar, out.result.T_rig_world);
-  state.frames_since_keyframe = 0;
-  state.best_direct_overlap = overlap_by_camera(map, out.matches, *similar);
-  state.best_overlap = 0;
+  refer_to(*similar, out.frame, state.references);
+  const std::vector<int> overlap = overlap_by_camera(map, out.matches, *similar);
+  for (std::size_t c = 0; c < overlap.size(); ++c) {
+    if (state.references[c].keyframe == *similar) state.references[c].best_direct_overlap = overlap[c];
+  }
   out.at_similar_keyframe = true;
   return false;
 }

@@ -273,9 +273,12 @@ bool Tracker::keep_direct_pose(const Input& input, TrackOutcome& outcome) const 
 }
 
 bool Tracker::gives_up(const FrontEndState& state, TimeNs time_ns) const {
-  constexpr int kFew = 5;  // minimum number of frames in which the map is searched
-  return state.frames_lost >= options_.new_submap_after ||
-         (state.frames_lost >= kFew && to_seconds(time_ns - state.lost_since_ns) >= options_.new_submap_after_s);
+  constexpr int kFew = 5;             // minimum number of frames in which the map is searched
+  constexpr double kFastest = 0.025;  // s; of frames that follow each other faster, a short disturbance spoils many
+  const double lost_s = to_seconds(time_ns - state.lost_since_ns);
+  const int needed = options_.new_submap_after;
+  return (state.frames_lost >= needed && lost_s >= kFastest * (needed - 1)) ||
+         (state.frames_lost >= kFew && lost_s >= options_.new_submap_after_s);
 }
 
 // The next frames search for the rig where its last motion would have taken it, or near its last pose if that is too
@@ -312,7 +315,7 @@ bool Tracker::relocalise(Input& input, TrackOutcome& outcome) {
   std::sort(landmarks.begin(), landmarks.end());
   TrackerState& state = outcome.next.track;
   auto cameras = readmit_observing_cameras(state.cameras, seen, options_.tracking.consensus);
-  state = state_at_keyframe({}, input.frame.time_ns, place->matched_keyframe, std::move(landmarks));
+  state = state_at_keyframe({}, input.frame.time_ns, *input.map, place->matched_keyframe, std::move(landmarks));
   state.cameras = std::move(cameras);
   state.anchored = map::AnchoredPose::at(*input.map, place->matched_keyframe, place->T_rig_world);
   outcome.next.pending.reset();

@@ -65,9 +65,10 @@ struct FrontEndState {
   // During a monocular initialisation: the reference frame, and all frames since, beginning with the reference.
   std::shared_ptr<const StartCandidate> start_reference;
   std::vector<std::shared_ptr<const frame::BundledFrame>> waiting;
-  int direct_failures = 0;  // consecutive attempts of direct tracking that found no pose
-  int direct_pause = 0;     // number of frames until the next attempt
-  int direct_kept = 0;      // number of poses from direct tracking that were kept since features last gave a pose
+  int frames_of_others = 0;  // consecutive frames without an image of any camera of the reference frame
+  int direct_failures = 0;   // consecutive attempts of direct tracking that found no pose
+  int direct_pause = 0;      // number of frames until the next attempt
+  int direct_kept = 0;       // number of poses from direct tracking that were kept since features last gave a pose
   std::optional<PendingKeyframe> pending;
   // The last pending keyframe was not created. The next keyframe must come from a frame with features.
   bool keyframe_failed = false;

@@ -40,7 +40,7 @@ void Tracker::complete_keyframe(const map::CommitReport& report, TrackOutcome& o
   TrackResult& result = outcome.record.result;
   // Mapping may have committed a new scale while the frame was tracked.
   if (state.twist) state.twist->tail<3>() *= result.anchored.scale_change(*report.published);
-  state = state_at_keyframe(state, result.time_ns, report.keyframes.front(),
+  state = state_at_keyframe(state, result.time_ns, *report.published, report.keyframes.front(),
                             committed_landmarks(outcome.edit->landmarks, outcome.edit->base_landmarks, report));
   result.anchored = state.anchored;
 }
@@ -91,9 +91,11 @@ std::optional<CreatedKeyframe> Tracker::adopt_keyframe(const map::BundledMap& ma
   const geometry::SE3 T_rig_keyframe = *T_rig_world * T_then_world->inverse();
   std::vector<LandmarkId> landmarks = map::landmarks_of(map, keyframe);
   std::vector<map::VisibilityCount> counts = std::move(track.visibility_counts);
-  track = state_at_keyframe(track, track.time_ns, keyframe, std::move(landmarks));
+  track = state_at_keyframe(track, track.time_ns, map, keyframe, std::move(landmarks));
   track.anchored = map::AnchoredPose::at(map, keyframe, T_rig_keyframe * map.keyframe(keyframe).T_rig_world);
-  track.frames_since_keyframe = pending.frames;
+  for (CameraReference& r : track.references) {
+    if (r.keyframe == keyframe) r.frames = pending.frames;
+  }
   track.visibility_counts = std::move(counts);
   return created;
 }

@@ -9,7 +9,7 @@ namespace {
 using frame::BundledFrame;
 
 constexpr int kMetricAttempts = 5;  // frames in which only metric initialisation is attempted if cameras overlap
-constexpr int kMaxStartAge = 100;    // maximum age in frames of the reference frame of a monocular initialisation
+constexpr int kMaxStartAge = 100;   // maximum age in frames of the reference frame of a monocular initialisation
 
 // Number of landmarks of a keyframe observed by each camera.
 std::vector<int> landmarks_by_camera(const map::BundledKeyframe& keyframe) {
@@ -98,20 +98,24 @@ bool Tracker::correct_rig(const Input& input, TrackOutcome& outcome) const {
 }
 
 // Stores the frame. The frame becomes the new reference frame if the present one is too old or has too few matches with
-// it. A frame of other cameras cannot be matched with the reference frame and does not replace it.
+// it. A frame of other cameras cannot be matched with the reference frame and does not replace it, unless there is no
+// other kind any more.
 void Tracker::keep_reference_frame(Input& input, FrontEndState& state) const {
   const InitialisationOptions& options = options_.tracking.initialisation;
   if (state.start_reference && input.frame.num_keypoints() < static_cast<std::size_t>(options.min_monocular))
     return;  // too few keypoints to compare
+  const bool others = state.start_reference && from_other_cameras(*state.start_reference->frame, input.frame);
+  state.frames_of_others = others ? state.frames_of_others + 1 : 0;
   const bool good = state.start_reference &&
                     input.frame.id.value() - state.start_reference->frame->id.value() <= kMaxStartAge &&
-                    (from_other_cameras(*state.start_reference->frame, input.frame) ||
-                     comparable(*state.start_reference->frame, input.frame, options));
+                    (others ? state.frames_of_others < static_cast<int>(rig_.size())
+                            : comparable(*state.start_reference->frame, input.frame, options));
   const auto kept = std::make_shared<const BundledFrame>(std::move(input.frame));
   if (!good) {
     state.start_reference =
         std::make_shared<const StartCandidate>(StartCandidate{kept, {input.pyramids.begin(), input.pyramids.end()}});
     state.waiting.clear();
+    state.frames_of_others = 0;
   }
   state.waiting.push_back(kept);
 }
@@ -121,7 +125,7 @@ void Tracker::complete_start(const map::CommitReport& report, TrackOutcome& outc
   TrackResult& result = outcome.record.result;
   const KeyframeId last = report.keyframes.back();
   const map::BundledKeyframe& keyframe = report.published->keyframe(last);
-  state.track = state_at_keyframe({}, result.time_ns, last,
+  state.track = state_at_keyframe({}, result.time_ns, *report.published, last,
                                   committed_landmarks(outcome.edit->landmarks, outcome.edit->base_landmarks, report));
   state.track.cameras = readmit_observing_cameras(std::vector<CameraConsensusState>(rig_.size()),
                                                   landmarks_by_camera(keyframe), options_.tracking.consensus);

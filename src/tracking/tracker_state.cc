@@ -36,16 +36,14 @@ void apply_scale_change(const map::BundledMap& map, TrackerState& state) {
   state.anchored.rescale(map);
 }
 
-TrackerState state_at_keyframe(const TrackerState& before, TimeNs time_ns, KeyframeId keyframe,
-                               std::vector<LandmarkId> landmarks) {
+TrackerState state_at_keyframe(const TrackerState& before, TimeNs time_ns, const map::BundledMap& map,
+                               KeyframeId keyframe, std::vector<LandmarkId> landmarks) {
   TrackerState state = before;
   state.status = TrackStatus::kTracking;
   state.time_ns = time_ns;
   state.anchored = {.reference = keyframe, .T_rig_reference = geometry::SE3()};
   state.landmarks = std::move(landmarks);
-  state.frames_since_keyframe = 0;
-  state.best_overlap = 0;
-  state.best_direct_overlap.clear();
+  refer_to(keyframe, *map.keyframe(keyframe).frame, state.references);
   state.direct = {};
   state.visibility_counts.clear();
   return state;

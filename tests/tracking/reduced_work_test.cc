@@ -24,6 +24,8 @@ TEST(ReducedWork, EveryLevelIsLessThanTheOneBefore) {
     EXPECT_LT(tracking.direct.min_overlap, before.direct.min_overlap);
     EXPECT_LT(tracking.keyframe.min_overlap, before.keyframe.min_overlap);
     EXPECT_GT(tracking.keyframe.min_interval, before.keyframe.min_interval);
+    // Fewer keypoints are no reason for a keyframe.
+    EXPECT_LT(tracking.keyframe.min_tracked_close, before.keyframe.min_tracked_close);
     // A camera of many is not short of inliers because fewer of its landmarks are aligned.
     EXPECT_LT(tracking.keyframe.min_camera_inliers, tracking.direct.min_per_image);
   }
@@ -31,15 +33,16 @@ TEST(ReducedWork, EveryLevelIsLessThanTheOneBefore) {
 
 TEST(ReducedWork, AChangeOfTheLevelDoesNotLookLikeALossOfLandmarks) {
   TrackerState state;
-  state.best_overlap = 400;
-  state.best_direct_overlap = {200, 100};
+  state.references = {{KeyframeId(0), 1, 400, 200}, {KeyframeId(0), 1, 200, 100}};
   state.direct.best_inliers = {300, 150};
   change_level(0, 2, state);
-  EXPECT_EQ(state.best_overlap, 200);
-  EXPECT_EQ(state.best_direct_overlap, (std::vector<int>{100, 50}));
+  EXPECT_EQ(state.references[0].best_overlap, 200);
+  EXPECT_EQ(state.references[1].best_overlap, 100);
+  EXPECT_EQ(state.references[0].best_direct_overlap, 100);
+  EXPECT_EQ(state.references[1].best_direct_overlap, 50);
   EXPECT_EQ(state.direct.best_inliers, (std::vector<int>{150, 75}));
   change_level(2, 1, state);  // counts will grow by themselves
-  EXPECT_EQ(state.best_overlap, 200);
+  EXPECT_EQ(state.references[0].best_overlap, 200);
 }
 
 }  // namespace

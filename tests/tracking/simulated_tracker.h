@@ -40,7 +40,7 @@ inline TrackerState state_at_first(const map::SimulatedMap& world) {
     if (l.valid()) seen.push_back(l);
   }
   std::sort(seen.begin(), seen.end());
-  return state_at_keyframe({}, world.frames[0].frame.time_ns, first, seen);
+  return state_at_keyframe({}, world.frames[0].frame.time_ns, world.map, first, seen);
 }
 
 class SimulatedTracker {

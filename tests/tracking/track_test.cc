@@ -363,14 +363,19 @@ TEST(TrackerState, IsResetAtAKeyframe) {
   TrackerState before;
   before.status = TrackStatus::kTracking;
   before.twist = geometry::Vector6d::Ones().eval();
-  before.frames_since_keyframe = 7;
-  before.best_overlap = 300;
+  const map::SimulatedMap world = true_map(simulator(synthetic::default_rig()), 0.0, 1.0);
+  const KeyframeId keyframe(0);
+  before.references.assign(world.map.rig().size(), {KeyframeId(9), 7, 300, 200});
   before.visibility_counts = {{LandmarkId(1), 1, 1}};
-  const TrackerState state = state_at_keyframe(before, 50, KeyframeId(4), {LandmarkId(2), LandmarkId(3)});
-  EXPECT_EQ(state.anchored.reference, KeyframeId(4));
+  const TrackerState state = state_at_keyframe(before, 50, world.map, keyframe, {LandmarkId(2), LandmarkId(3)});
+  EXPECT_EQ(state.anchored.reference, keyframe);
   EXPECT_EQ(state.time_ns, 50);
-  EXPECT_EQ(state.frames_since_keyframe, 0);
-  EXPECT_EQ(state.best_overlap, 0);
+  for (const CameraReference& r : state.references) {
+    EXPECT_EQ(r.keyframe, keyframe);
+    EXPECT_EQ(r.frames, 0);
+    EXPECT_EQ(r.best_overlap, 0);
+    EXPECT_EQ(r.best_direct_overlap, 0);
+  }
   EXPECT_TRUE(state.visibility_counts.empty());
   EXPECT_EQ(state.anchored.T_rig_reference.translation().norm(), 0.0);
   EXPECT_TRUE(state.twist.has_value());
