@@ -155,7 +155,7 @@ TEST(Tracker, ContinuesFromAKeyframeThatWasCreatedLater) {
     EXPECT_EQ(created->keyframe, k);
     EXPECT_EQ(run.state.track.anchored.reference, k);
     EXPECT_LT(map::distance_m(*run.state.track.anchored.resolve(*map), before), 0.01);
-    EXPECT_EQ(run.state.track.frames_since_keyframe, later);
+    for (const CameraReference& r : run.state.track.references) EXPECT_EQ(r.frames, later);
     EXPECT_FALSE(run.state.pending);
     EXPECT_EQ(run.process(run.frame(4 + later)).result.status, TrackStatus::kTracking);
   }
