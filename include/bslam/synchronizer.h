@@ -21,7 +21,7 @@ namespace bslam {
 enum class DropReason {
   kDuplicate,  // the camera has already delivered an image with this time
   kTooLate,    // its bundle or a later one is already complete, or the time of its bundle would not increase
-  kFarAhead,   // its time stamp is far ahead of all earlier images, as with a broken clock
+  kFarAhead,   // its time stamp is ahead of those of the other cameras, as with a broken clock
   kOverflow    // its bundle was not fetched in time
 };
 inline constexpr std::size_t kDropReasons = 4;
@@ -44,10 +44,12 @@ struct SyncOptions {
   // late. Bundles wait so much longer for such images, but not longer than max_wait_s.
   double reorder_s = 0;
   double silent_after_s = 1;  // a camera without an image for this long is ignored until it delivers again
-  // An image that is ahead of all others by more than this time and more than four intervals of its camera is dropped,
-  // unless the next two images of the camera confirm its clock. An image that is ahead by less ends the waiting for
-  // images that are earlier by more than max_wait_s, which are too late if they come. Clocks that go back are not
-  // followed: create a new Synchronizer then, and a new System.
+  // If the clock of a camera steps ahead by more than max_wait_s and the other cameras go on as before, its images are
+  // dropped until its clock returns or the others have been silent for silent_after_s. If the clocks of all cameras
+  // step, or there are no others, the step is accepted, but if it is longer than this time and than four intervals of
+  // the camera, only at its third image; the first two are dropped. The first image is not trusted either: if it is
+  // ahead by more than this time of the next two, which agree with each other, it is dropped. Other clocks that go back
+  // are not followed: create a new Synchronizer then, and a new System.
   double max_ahead_s = 1;
   // Maximum number of waiting images per camera; if it is exceeded, the oldest bundle is completed without its missing
   // images.
@@ -75,7 +77,8 @@ struct SyncCounts {
 // the tolerance after it belong. A camera with a constant delay relative to camera 0 (to within a tenth of the interval
 // of camera 0) is grouped as if it captured together with camera 0, even if the delay is half an interval, as for two
 // cameras that are triggered alternately. The tolerance is then at least that tenth. Live, the delay is known after
-// about five images of each camera, and again after it has changed; in a recording it is known from the first image on.
+// about five images of each camera, and again after it has changed, and follows a slow drift, as of cameras without a
+// common trigger; in a recording it is known from the first image on.
 //
 // A bundle is ready when no missing image can be expected for it: each camera has delivered a later image, is not due
 // yet according to its rate, is silent, or max_wait_s has passed. All times are time stamps of images, never of the

@@ -9,10 +9,8 @@ namespace bslam::api {
 namespace {
 
 constexpr TimeNs kForever = std::numeric_limits<TimeNs>::max() / 2;
-constexpr std::size_t kRateIntervals =
-    16;                                // number of intervals between images from which the rate of a camera is computed
-constexpr TimeNs kAheadIntervals = 4;  // number of intervals of its camera that an image may be ahead of all others
-constexpr int kClockChangeImages = 3;  // number of consecutive images far ahead after which the new clock is accepted
+// Number of intervals between images from which the rate of a camera is computed.
+constexpr std::size_t kRateIntervals = 16;
 
 // Returns the shortest interval between consecutive times, or 0 for fewer than two. Unlike the median it remains the
 // interval of a camera that loses many images.
@@ -30,10 +28,10 @@ ImageSorter::ImageSorter(std::size_t cameras, const SyncOptions& options)
       max_wait_(from_seconds(options.max_wait_s)),
       reorder_(from_seconds(options.reorder_s)),
       silent_after_(from_seconds(options.silent_after_s)),
-      max_ahead_(from_seconds(options.max_ahead_s)),
       cameras_(cameras),
       recent_(cameras),
       phases_{std::vector<image::CapturePhase>(cameras), tolerance_},
+      clocks_(cameras, {max_wait_, silent_after_, from_seconds(options.max_ahead_s)}),
       anchor_(cameras) {}
 
 std::size_t ImageSorter::waiting() const {
@@ -44,28 +42,33 @@ std::size_t ImageSorter::waiting() const {
 
 void ImageSorter::push(std::size_t camera, TimeNs time_ns, const CameraImage& image, std::vector<ImageBundle>& bundles,
                        std::vector<DroppedImage>& dropped) {
-  if (accept(camera, time_ns, image, dropped)) emit_complete(false, bundles, dropped);
+  if (accept(camera, time_ns, image, bundles, dropped)) emit_complete(false, bundles, dropped);
 }
 
 void ImageSorter::flush(std::vector<ImageBundle>& bundles, std::vector<DroppedImage>& dropped) {
   emit_complete(true, bundles, dropped);
 }
 
-// A single time stamp of a broken clock must not make all other images late.
-bool ImageSorter::far_ahead(std::size_t c, TimeNs time_ns) {
-  Camera& camera = cameras_[c];
-  const TimeNs gap = newest_ns_ ? time_ns - *newest_ns_ : 0;
-  const bool ahead = gap > max_ahead_ && gap / kAheadIntervals > shortest_interval(recent_[c]);
-  camera.far_ahead = ahead ? camera.far_ahead + 1 : 0;
-  return ahead && camera.far_ahead < kClockChangeImages;
-}
-
-void ImageSorter::update_times(std::size_t c, TimeNs time_ns) {
+// Returns false if the image must be dropped because of the clock of its camera.
+bool ImageSorter::watch_clock(std::size_t c, TimeNs time_ns, std::vector<DroppedImage>& dropped) {
   std::vector<TimeNs>& recent = recent_[c];
+  std::vector<ClockWatch::Refuted> refuted;
+  const ClockWatch::Verdict verdict = clocks_.add(c, time_ns, shortest_interval(recent), refuted);
+  for (const ClockWatch::Refuted& r : refuted) remove(r, dropped);
+  if (verdict == ClockWatch::Verdict::kFarAhead) return false;
   recent.insert(std::ranges::upper_bound(recent, time_ns), time_ns);
   if (recent.size() > kRateIntervals + 1) recent.erase(recent.begin());
-  first_ns_ = std::min(first_ns_.value_or(time_ns), time_ns);
-  newest_ns_ = std::max(newest_ns_.value_or(time_ns), time_ns);
+  return true;
+}
+
+// Removes waiting images of a wrong clock.
+void ImageSorter::remove(const ClockWatch::Refuted& refuted, std::vector<DroppedImage>& dropped) {
+  std::erase_if(recent_[refuted.camera], [&](TimeNs time_ns) { return time_ns >= refuted.from_ns; });
+  std::erase_if(cameras_[refuted.camera].waiting, [&](const WaitingImage& w) {
+    if (w.time_ns < refuted.from_ns) return false;
+    dropped.push_back({refuted.camera, w.image.time_ns, DropReason::kFarAhead});
+    return true;
+  });
 }
 
 // Estimates the delays of the cameras relative to camera 0 from their newest images. New delays are used as soon as
@@ -84,22 +87,39 @@ void ImageSorter::update_phases() {
 }
 
 // Returns true if the image was added to the waiting images of its camera.
-bool ImageSorter::accept(std::size_t c, TimeNs time_ns, const CameraImage& image, std::vector<DroppedImage>& dropped) {
+bool ImageSorter::accept(std::size_t c, TimeNs time_ns, const CameraImage& image, std::vector<ImageBundle>& bundles,
+                         std::vector<DroppedImage>& dropped) {
   Camera& camera = cameras_[c];
   const auto drop = [&](DropReason reason) {
     dropped.push_back({c, image.time_ns, reason});
     return false;
   };
   if (std::ranges::binary_search(recent_[c], time_ns)) return drop(DropReason::kDuplicate);
-  if (far_ahead(c, time_ns)) return drop(DropReason::kFarAhead);
-  update_times(c, time_ns);
-  if (last_bundle_ns_ && in_phase(c, time_ns) <= *last_bundle_ns_) return drop(DropReason::kTooLate);
+  if (!watch_clock(c, time_ns, dropped)) return drop(DropReason::kFarAhead);
   if (camera.last_ns && time_ns <= *camera.last_ns)
     return drop(DropReason::kTooLate);  // its delay relative to camera 0 has changed
-  if (belongs_to_anchor(c, time_ns)) return drop(DropReason::kTooLate);
+  const bool late = (last_bundle_ns_ && in_phase(c, time_ns) <= *last_bundle_ns_) || belongs_to_anchor(c, time_ns);
+  if (late && !can_be_alone(c, time_ns)) return drop(DropReason::kTooLate);
+  if (late) {
+    last_time_ns_ = camera.last_ns = time_ns;
+    bundles.emplace_back().images.resize(cameras_.size());
+    bundles.back().images[c] = image;
+    return false;
+  }
   const auto place = std::ranges::upper_bound(camera.waiting, time_ns, {}, &WaitingImage::time_ns);
   camera.waiting.insert(place, {time_ns, image});
   update_phases();
+  return true;
+}
+
+// Returns true if an image that is too late for its bundle can be a bundle of its own, the next one in order of time,
+// since no camera has an earlier image, and none is expected. This happens when the delays of the cameras change.
+bool ImageSorter::can_be_alone(std::size_t c, TimeNs time_ns) const {
+  if (last_time_ns_ && time_ns <= *last_time_ns_ + phases_.tolerance_ns) return false;
+  for (std::size_t d = 0; d < cameras_.size(); ++d) {
+    if (!cameras_[d].waiting.empty() && cameras_[d].waiting[0].time_ns <= time_ns) return false;
+    if (d != c && complete_until(d) + phases_.cameras[d].later_ns <= time_ns) return false;
+  }
   return true;
 }
 
@@ -114,9 +134,9 @@ bool ImageSorter::belongs_to_anchor(std::size_t c, TimeNs time_ns) const {
 // Returns the time, in phase with camera 0, up to which no further image of the camera is expected.
 TimeNs ImageSorter::complete_until(std::size_t c) const {
   const std::vector<TimeNs>& recent = recent_[c];
-  const TimeNs last_ns = recent.empty() ? *first_ns_ : recent.back();
-  if (*newest_ns_ - last_ns > silent_after_) return kForever;
-  const TimeNs timeout = *newest_ns_ - max_wait_;
+  const TimeNs last_ns = recent.empty() ? clocks_.first_ns() : recent.back();
+  if (clocks_.newest_ns() - last_ns > silent_after_) return kForever;
+  const TimeNs timeout = clocks_.newest_ns() - max_wait_;
   if (recent.empty()) return timeout;
   const TimeNs next_due = last_ns + shortest_interval(recent) / 4 * 3 - reorder_;
   return in_phase(c, std::max(next_due, timeout));
@@ -172,13 +192,26 @@ void ImageSorter::emit_complete(bool last, std::vector<ImageBundle>& bundles, st
       drop(frame, dropped);
       continue;
     }
-    if (!last && !exceeds_limit() && !is_complete(frame)) return;
-    if (last_time_ns_ && bundle_time(frame) <= *last_time_ns_) {
-      drop(frame, dropped);
+    if (!last && !exceeds_limit() && !(clocks_.confirmed() && is_complete(frame))) return;
+    const image::GroupedFrame& next = earliest(groups);
+    if (last_time_ns_ && bundle_time(next) <= *last_time_ns_) {
+      drop(next, dropped);
       continue;
     }
-    emit(frame, bundles);
+    emit(next, bundles);
+    if (&next == &frame) last_bundle_ns_ = frame.time_ns;
   }
+}
+
+// Returns the frame of the earliest bundle that can be the next one, which is the first frame unless the delays of the
+// cameras are changing: an image whose delay is not the known one can be earlier than the images of camera 0 before it.
+const image::GroupedFrame& ImageSorter::earliest(const image::FrameGroups& groups) const {
+  const image::GroupedFrame* first = &groups.frames.front();
+  for (const image::GroupedFrame& frame : groups.frames) {
+    const bool in_order = std::ranges::all_of(frame.images, [](int at) { return at <= 0; });  // none of a camera waits
+    if (in_order && bundle_time(frame) < bundle_time(*first)) first = &frame;
+  }
+  return *first;
 }
 
 // Returns the time of camera 0's image, or of the earliest image, which System::process takes as the time of the
@@ -201,7 +234,6 @@ void ImageSorter::emit(const image::GroupedFrame& frame, std::vector<ImageBundle
                        : std::optional(cameras_[c].waiting[static_cast<std::size_t>(frame.images[c])].time_ns);
     }
   }
-  last_bundle_ns_ = frame.time_ns;
   last_time_ns_ = bundle_time(frame);
   ImageBundle& bundle = bundles.emplace_back();
   bundle.images.resize(cameras_.size());

@@ -8,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "api/clock_watch.h"
 #include "base/timestamp.h"
 #include "image/capture_phase.h"
 #include "image/frame_grouping.h"
@@ -34,19 +35,21 @@ class ImageSorter {
   };
   struct Camera {
     std::vector<WaitingImage> waiting;  // in order of time
-    int far_ahead = 0;                  // number of consecutive images that are far ahead of all others
     std::optional<TimeNs> last_ns;      // time of its last image in a bundle
   };
 
-  bool accept(std::size_t camera, TimeNs time_ns, const CameraImage& image, std::vector<DroppedImage>& dropped);
-  bool far_ahead(std::size_t camera, TimeNs time_ns);
-  void update_times(std::size_t camera, TimeNs time_ns);
+  bool accept(std::size_t camera, TimeNs time_ns, const CameraImage& image, std::vector<ImageBundle>& bundles,
+              std::vector<DroppedImage>& dropped);
+  bool can_be_alone(std::size_t camera, TimeNs time_ns) const;
+  bool watch_clock(std::size_t camera, TimeNs time_ns, std::vector<DroppedImage>& dropped);
+  void remove(const ClockWatch::Refuted& refuted, std::vector<DroppedImage>& dropped);
   void update_phases();
   TimeNs in_phase(std::size_t camera, TimeNs time_ns) const { return time_ns - phases_.cameras[camera].later_ns; }
   TimeNs complete_until(std::size_t camera) const;
   bool is_complete(const image::GroupedFrame& frame) const;
   bool exceeds_limit() const;
   void emit_complete(bool last, std::vector<ImageBundle>& bundles, std::vector<DroppedImage>& dropped);
+  const image::GroupedFrame& earliest(const image::FrameGroups& groups) const;
   TimeNs bundle_time(const image::GroupedFrame& frame) const;
   void emit(const image::GroupedFrame& frame, std::vector<ImageBundle>& bundles);
   void drop(const image::GroupedFrame& frame, std::vector<DroppedImage>& dropped);
@@ -55,13 +58,13 @@ class ImageSorter {
   image::FrameGroups grouped() const;
 
   const std::size_t max_images_;
-  const TimeNs tolerance_, max_wait_, reorder_, silent_after_, max_ahead_;
+  const TimeNs tolerance_, max_wait_, reorder_, silent_after_;
   std::vector<Camera> cameras_;
   std::vector<std::vector<TimeNs>> recent_;  // per camera: increasing times of its newest images, for rate and phase
   image::CapturePhases phases_;
-  std::optional<TimeNs> first_ns_, newest_ns_;  // times of the first and the newest image of all cameras
-  std::optional<TimeNs> last_bundle_ns_;        // time of the last complete bundle, in phase with camera 0
-  std::optional<TimeNs> last_time_ns_;          // its bundle_time()
+  ClockWatch clocks_;
+  std::optional<TimeNs> last_bundle_ns_;  // time of the last complete bundle in phase with camera 0
+  std::optional<TimeNs> last_time_ns_;    // its bundle_time()
   // Per camera: time of its image in the anchor, the last complete bundle with an image of camera 0; nullopt if none.
   std::vector<std::optional<TimeNs>> anchor_;
 };

@@ -11,6 +11,7 @@ namespace bslam::image {
 namespace {
 
 constexpr std::size_t kMinImages = 5;
+constexpr std::size_t kMinDriftImages = 12;
 constexpr TimeNs kMaxPeriod = 1'000'000'000;  // slower cameras would be too far apart for one frame
 constexpr double kMinShare = 0.9;  // minimum fraction of the images that are within a tenth of the period of the phase
 
@@ -52,6 +53,55 @@ TimeNs densest(const std::vector<TimeNs>& offsets, TimeNs period_ns) {
   return cyclic[first + count / 2];
 }
 
+// By how much the offsets, in order of time, change within half of their number: the difference of the medians of both
+// halves, or 0 if it may be by chance, since the halves overlap or are small.
+TimeNs drift(const std::vector<TimeNs>& offsets) {
+  if (offsets.size() < kMinDriftImages) return 0;
+  const auto half = offsets.begin() + static_cast<std::ptrdiff_t>(offsets.size() / 2);
+  const std::vector<TimeNs> before(offsets.begin(), half), after(half, offsets.end());
+  const auto [before_min, before_max] = std::ranges::minmax(before);
+  const auto [after_min, after_max] = std::ranges::minmax(after);
+  return before_max < after_min || after_max < before_min ? median(after) - median(before) : 0;
+}
+
+// Whether at least 90 % of the offsets are within a tenth of the period of this one.
+bool agree(const std::vector<TimeNs>& offsets, TimeNs with, TimeNs period_ns) {
+  const auto count = std::ranges::count_if(
+      offsets, [&](TimeNs offset) { return std::abs(wrapped(offset - with, period_ns)) <= period_ns / 10; });
+  return static_cast<double>(count) >= kMinShare * static_cast<double>(offsets.size());
+}
+
+struct Estimate {
+  CapturePhase phase;        // of the middle of the images
+  TimeNs drift_ns = 0;       // drift() of the delay, if it is constant
+  bool former_fits = false;  // whether the former phase is as constant
+};
+
+// See capture_phase(). `former`: the former phase.
+std::optional<Estimate> estimate(const std::vector<TimeNs>& camera0, const std::vector<TimeNs>& times, TimeNs period_ns,
+                                 const CapturePhase& former) {
+  std::vector<TimeNs> relative = offsets(camera0, times, period_ns);
+  if (relative.size() < kMinImages || 2 * relative.size() < during(camera0, times)) return std::nullopt;
+  const TimeNs typical = densest(relative, period_ns);
+  for (TimeNs& offset : relative) offset = wrapped(offset - typical, period_ns);
+  const TimeNs middle = median(relative);
+  if (!agree(relative, middle, period_ns)) return Estimate{};
+  return Estimate{{true, wrapped(typical + middle, period_ns)},
+                  drift(relative),
+                  former.constant && agree(relative, wrapped(former.later_ns - typical, period_ns), period_ns)};
+}
+
+// Returns the phase of a camera, given the former one, which remains while it is right. That of a camera whose delay
+// drifts is the phase of its newest image, and is renewed earlier, before images are outside of the tolerance.
+CapturePhase next_phase(const Estimate& found, const CapturePhase& former, TimeNs tolerance_ns, TimeNs period_ns) {
+  CapturePhase phase = found.phase;
+  phase.later_ns = wrapped(phase.later_ns + found.drift_ns, period_ns);
+  if (std::abs(phase.later_ns) <= tolerance_ns) phase.later_ns = 0;
+  const TimeNs change_ns = std::abs(wrapped(phase.later_ns - former.later_ns, period_ns));
+  const bool remains = found.former_fits && change_ns <= (found.drift_ns == 0 ? period_ns / 10 : period_ns / 20);
+  return remains ? former : phase;
+}
+
 }  // namespace
 
 // Times are not multiplied: time stamps may be any, so that products could overflow.
@@ -62,15 +112,8 @@ TimeNs wrapped(TimeNs time_ns, TimeNs period_ns) {
 
 std::optional<CapturePhase> capture_phase(const std::vector<TimeNs>& camera0, const std::vector<TimeNs>& times,
                                           TimeNs period_ns) {
-  std::vector<TimeNs> relative = offsets(camera0, times, period_ns);
-  if (relative.size() < kMinImages || 2 * relative.size() < during(camera0, times)) return std::nullopt;
-  const TimeNs typical = densest(relative, period_ns);
-  for (TimeNs& offset : relative) offset = wrapped(offset - typical, period_ns);
-  const TimeNs middle = median(relative);
-  const auto agree = std::ranges::count_if(
-      relative, [&](TimeNs offset) { return std::abs(wrapped(offset - middle, period_ns)) <= period_ns / 10; });
-  if (static_cast<double>(agree) < kMinShare * static_cast<double>(relative.size())) return CapturePhase{false, 0};
-  return CapturePhase{true, wrapped(typical + middle, period_ns)};
+  const std::optional<Estimate> found = estimate(camera0, times, period_ns, {});
+  return found ? std::optional(found->phase) : std::nullopt;
 }
 
 CapturePhases capture_phases(std::span<const std::vector<TimeNs>> times, TimeNs tolerance_ns,
@@ -81,11 +124,10 @@ CapturePhases capture_phases(std::span<const std::vector<TimeNs>> times, TimeNs 
   const bool has_period = period_ns > 0 && period_ns <= kMaxPeriod;
   for (std::size_t c = 1; c < times.size() && has_period; ++c) {
     CapturePhase& phase = out.cameras[c];
-    CapturePhase found = capture_phase(times[0], times[c], period_ns).value_or(phase);
-    if (std::abs(found.later_ns) <= tolerance_ns) found.later_ns = 0;
-    const bool remains = phase.constant && found.constant &&
-                         std::abs(wrapped(found.later_ns - phase.later_ns, period_ns)) <= period_ns / 10;
-    if (!remains) phase = found;
+    if (std::optional<Estimate> found = estimate(times[0], times[c], period_ns, phase)) {
+      if (before.empty()) found->drift_ns = 0;  // all images, not only the newest ones
+      phase = next_phase(*found, phase, tolerance_ns, period_ns);
+    }
     if (phase.constant) out.tolerance_ns = std::max(tolerance_ns, period_ns / 10);
   }
   return out;

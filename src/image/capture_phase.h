@@ -41,8 +41,9 @@ struct CapturePhases {
 
 // Returns the phases of cameras whose images have the times `times[i]`, strictly increasing. Those of camera 0 are at
 // least one. `tolerance_ns`: largest difference of cameras that capture together. `before`: the earlier phases of live
-// cameras, which remain as long as they are right to within a tenth of the period, or as long as there are too few
-// images to decide; empty if there are none. Cameras slower than 1 Hz have no phase, since the images of a frame must
+// cameras, which remain as long as they are right to within a tenth of the period, or half of that if the delay
+// drifts, or as long as there are too few images to decide; empty if there are none. The new ones are then those of the
+// newest images, if the delay drifts. Cameras slower than 1 Hz have no phase, since the images of a frame must
 // not be more than a second apart.
 CapturePhases capture_phases(std::span<const std::vector<TimeNs>> times, TimeNs tolerance_ns,
                              std::span<const CapturePhase> before = {});

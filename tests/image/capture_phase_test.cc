@@ -72,6 +72,19 @@ TEST(CapturePhases, RemainWhileTheyAreNotContradicted) {
   EXPECT_FALSE(phase_after(images(20, 41, 0, 0, 2)).constant);
 }
 
+// Of a live camera with a slightly longer period, whose delay grows by 1 ms in two images.
+TEST(CapturePhases, OfADriftingDelayAreThatOfTheNewestImages) {
+  const auto camera0 = images(17, 50, 0, 0, 1);
+  std::vector<TimeNs> times;
+  for (int k = 0; k < 17; ++k) times.push_back((50 * k + 6 + k / 2) * kMs);
+  const auto live = [&](int former_ms) {
+    const std::vector<CapturePhase> before = {{}, {.constant = true, .later_ns = former_ms * kMs}};
+    return delay_ms(capture_phases(std::vector{camera0, times}, 2 * kMs, before).cameras[1]);
+  };
+  EXPECT_NEAR(live(9), 14, 1) << "not 10, that of the middle image";
+  EXPECT_NEAR(delay_ms(capture_phases(std::vector{camera0, times}, 2 * kMs).cameras[1]), 10, 1) << "of a recording";
+}
+
 TEST(CapturePhases, WidenTheToleranceWhileAnyIsConstant) {
   const std::vector<CapturePhase> before = {{}, {.constant = true, .later_ns = 0}};
   const auto tolerance = [&](const std::vector<TimeNs>& times, std::span<const CapturePhase> former) {
