@@ -10,6 +10,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "image_decoding/jpeg_warnings.h"
 #include "image_decoding/plain_files.h"
 
 namespace bslam::image_decoding {
@@ -87,9 +88,7 @@ cv::Mat decode_jpeg(std::string_view bytes) {
   cv::Mat image(height, width, CV_8UC1);
   const int failed = tjDecompress2(decoder.get(), data(bytes), bytes.size(), image.data, width,
                                    static_cast<int>(image.step), height, TJPF_GRAY, 0);
-  // Cameras write files with small irregularities, of which the decoder only warns.
-  if (failed != 0 && tjGetErrorCode(decoder.get()) != TJERR_WARNING) return {};
-  return image;
+  return failed == 0 || is_usable(decoder.get()) ? image : cv::Mat();
 }
 
 cv::Mat decode_webp(std::string_view bytes) {

@@ -10,6 +10,7 @@
 
 #include "base/atomic_file.h"
 #include "image_decoding/image_file.h"
+#include "image_decoding/jpeg_warnings.h"
 
 namespace bslam::image_decoding {
 namespace {
@@ -55,7 +56,7 @@ cv::Mat colours_of_jpeg(std::string_view bytes) {
   cv::Mat out(height, width, CV_8UC3);
   const int failed = tjDecompress2(decoder.get(), data, bytes.size(), out.data, width, static_cast<int>(out.step),
                                    height, TJPF_RGB, 0);
-  return failed == 0 || tjGetErrorCode(decoder.get()) == TJERR_WARNING ? out : cv::Mat();
+  return failed == 0 || is_usable(decoder.get()) ? out : cv::Mat();
 }
 
 cv::Mat colours_of_file(std::string_view bytes) {

@@ -159,6 +159,22 @@ TEST(ImageFile, RejectsEveryTruncation) {
   }
 }
 
+// The decoder fills the missing part with grey, and only warns.
+TEST(ImageFile, RejectsAJpegWhoseDataEndBeforeItsMarker) {
+  const std::string bytes = encoded(picture_of(320, 240), ".jpg");
+  for (const std::size_t percent : {40, 60, 80, 95})
+    EXPECT_FALSE(decode_grey(bytes.substr(0, bytes.size() * percent / 100) + "\xff\xd9")) << percent;
+}
+
+TEST(ImageFile, AcceptsAJpegWithBytesBeforeItsEndMarker) {
+  std::string bytes = encoded(picture_of(320, 240), ".jpg");
+  const auto intact = decode_grey(bytes);
+  bytes.insert(bytes.size() - 2, std::string(600, '\x55'));  // the decoder warns of them
+  const auto image = decode_grey(bytes);
+  ASSERT_TRUE(intact && image);
+  EXPECT_EQ(image->row(239)[319], intact->row(239)[319]);
+}
+
 TEST(ImageFile, RejectsOtherData) {
   EXPECT_FALSE(decode_grey(""));
   EXPECT_FALSE(decode_grey("not an image"));
