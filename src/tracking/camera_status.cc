@@ -15,6 +15,7 @@ constexpr int kUnknownPeriod = 11;  // frames without an image until a camera of
 constexpr double kHealthyInlierRatio = 0.1, kMaxInconsistentInlierRatio = 0.02;
 constexpr double kMinKeypoints = 1000;
 constexpr int kMinFrames = 10;
+constexpr double kWindow = 300;  // number of frames after which a frame counts little, so that late faults are seen
 
 // Returns true if the number of keypoints is meaningful for the image.
 bool counts_features(const CameraEvidence& e) {
@@ -102,8 +103,9 @@ std::vector<CameraStatus> CameraStatusMonitor::update(std::span<const CameraEvid
     record_image(evidence[c].image == image::ImageState::kPresent, cameras_[c]);
     if (counts_features(evidence[c])) cameras_[c].few_features = *evidence[c].extracted < kFewKeypoints;
     if (!any_agrees || evidence[c].keypoints == 0) continue;
-    cameras_[c].keypoints += evidence[c].keypoints;
-    cameras_[c].inliers += evidence[c].inliers;
+    constexpr double kKept = 1 - 1 / kWindow;
+    cameras_[c].keypoints = kKept * cameras_[c].keypoints + evidence[c].keypoints;
+    cameras_[c].inliers = kKept * cameras_[c].inliers + evidence[c].inliers;
     ++cameras_[c].frames;
   }
   std::vector<CameraStatus> out;

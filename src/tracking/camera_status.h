@@ -54,7 +54,7 @@ struct CameraEvidence {
 // Determines the status of each camera of a rig, frame by frame. A camera whose image rate is lower than the frame rate
 // is not `no-images` between two images: its period is the median of the last intervals between its images. A camera is
 // degraded with the reason `inconsistent` if it has many keypoints of which hardly any agrees with the pose, counted
-// over the frames in which some camera agrees: its extrinsics are probably wrong.
+// over the last hundreds of frames in which some camera agrees: its extrinsics are probably wrong.
 class CameraStatusMonitor {
  public:
   explicit CameraStatusMonitor(std::size_t cameras) : cameras_(cameras) {}
@@ -68,7 +68,7 @@ class CameraStatusMonitor {
     int since_image = 0;                // frames since its last image
     std::array<int, 9> steps = {};      // ring buffer of the last intervals between images, in frames
     std::size_t num_steps = 0;          // total number of intervals so far
-    double keypoints = 0, inliers = 0;  // sums over the frames in which some camera has inliers
+    double keypoints = 0, inliers = 0;  // sums over the frames in which some camera has inliers, of decreasing weight
     int frames = 0;                     // number of these frames
     bool few_features = false;          // in the last image whose features were extracted
   };

@@ -116,6 +116,20 @@ TEST(CameraStatus, ACameraWithHardlyAnyInliersIsInconsistent) {
   EXPECT_EQ(after(12, 0, 0), kGood);     // lost
 }
 
+TEST(CameraStatus, ACameraThatWasGoodForAnHourBecomesInconsistentWithinAMinute) {
+  CameraStatusMonitor monitor(2);
+  CameraEvidence first = good(), second = good();
+  first.inliers = second.inliers = 200;
+  for (int i = 0; i < 72'000; ++i) monitor.update(std::vector{first, second});
+  second.inliers = 0;
+  CameraStatus status;
+  for (int i = 0; i < 1200; ++i) status = monitor.update(std::vector{first, second})[1];
+  EXPECT_EQ(status, degraded(CameraReason::kInconsistent));
+  second.inliers = 200;
+  for (int i = 0; i < 100; ++i) status = monitor.update(std::vector{first, second})[1];
+  EXPECT_EQ(status, kGood);
+}
+
 TEST(CameraStatus, NamesMatchTheSummary) {
   EXPECT_EQ(describe(CameraState::kOk), "ok");
   EXPECT_EQ(describe(CameraState::kDegraded), "degraded");
