@@ -64,9 +64,7 @@ bslam::Result<std::unique_ptr<SlamRunner>> SlamRunner::create(const bslam::Rig& 
   options.tolerance_s = parameters.sync_tolerance;
   options.max_wait_s = parameters.max_wait;
   options.max_bundles = static_cast<std::size_t>(parameters.max_bundles);
-  options.on_drop = [runner = out.get()](const bslam::DroppedImage& image) {
-    runner->log(bslam::LogLevel::kWarning, describe(image, runner->rig_));
-  };
+  options.on_drop = [runner = out.get()](const bslam::DroppedImage& image) { runner->note_drop(image); };
   auto synchronizer = bslam::Synchronizer::create(rig, options);
   if (!synchronizer) return synchronizer.error();
   out->synchronizer_.emplace(*std::move(synchronizer));
@@ -110,6 +108,19 @@ void SlamRunner::reject(std::size_t camera, const bslam::Error& error) {
     is_new = std::exchange(counts_[camera].last_error, message) != message;
   }
   if (is_new) log(bslam::LogLevel::kWarning, rig_.camera(camera).name + ": image rejected: " + message);
+}
+
+// Logs the first image of each camera and reason, and then every thousandth one.
+void SlamRunner::note_drop(const bslam::DroppedImage& image) {
+  constexpr std::size_t kEvery = 1000;
+  std::size_t count = 0;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    count = ++counts_[image.camera].dropped[static_cast<std::size_t>(image.reason)];
+  }
+  if (count > 1 && count % kEvery != 0) return;
+  log(bslam::LogLevel::kWarning,
+      describe(image, rig_) + (count == 1 ? "; further ones are counted" : ", " + std::to_string(count) + " so far"));
 }
 
 void SlamRunner::run() {

@@ -3,6 +3,7 @@
 
 #include <bslam/bslam.h>
 
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <memory>
@@ -59,6 +60,7 @@ class SlamRunner {
   struct CameraCounts {
     std::size_t rejected = 0;  // could not be converted
     std::string last_error;
+    std::array<std::size_t, bslam::kDropReasons> dropped = {};  // by the Synchronizer, for each reason
   };
   using Clock = std::chrono::steady_clock;
 
@@ -69,6 +71,7 @@ class SlamRunner {
   void keep_trajectory(const bslam::System& before);
   void process(const bslam::ImageBundle& images);
   void note_failure(const std::string& what);
+  void note_drop(const bslam::DroppedImage& image);
   void report_changes(const std::optional<bslam::FrameResult>& before, const bslam::FrameResult& now);
   void publish_cloud(const bslam::FrameResult& frame);
   void publish_path(const bslam::FrameResult& frame);

@@ -196,6 +196,16 @@ TEST_F(RosRunner, RejectedImagesAreCountedAndSaidOnce) {
   EXPECT_EQ(runner->diagnostics()[2].level, Level::kError);
 }
 
+TEST_F(RosRunner, DroppedImagesAreCountedAndSaidSeldom) {
+  const auto runner = make_runner();
+  push(*runner, 0, 1, 0);
+  for (int k = 0; k < 1500; ++k) push(*runner, 0, std::size_t{1});  // duplicates
+  const auto said = std::ranges::count_if(
+      published_.lines, [](const std::string& line) { return line.find("dropped: duplicate") != std::string::npos; });
+  EXPECT_EQ(said, 2);
+  EXPECT_EQ(value(runner->diagnostics(), 2, "dropped (duplicate)"), "1500");
+}
+
 TEST_F(RosRunner, WrongStartsAreErrors) {
   parameters_.map_file = (folder_.path() / "none.bmap").string();
   EXPECT_FALSE(SlamRunner::create(*rig_, parameters_, {}));
