@@ -69,7 +69,9 @@ struct FrameResult {
   // The pose in the map; identity unless tracking. The world frame is the frame of camera 0 at the start of the submap:
   // x right, y down, z forward, so that T_world_body begins with the pose of the body in camera 0; gravity is not
   // known. The pose jumps when a loop is closed. Poses of different submaps are unrelated; after submaps were merged,
-  // `submap` of later frames may differ for the same place.
+  // `submap` of later frames may differ for the same place. Camera 0 is the one that was calibrated: a refinement of
+  // the calibration may turn it in the body, so that T_world_cam0 then differs from that of MapView::Keyframe. The pose
+  // of a camera that belongs to MapView::rig() is T_world_body * rig().camera(i).T_body_cam.
   Pose T_world_cam0, T_world_body;
   // Scale of the map, which determines the unit of length of all poses and velocities. Valid if tracking.
   Scale scale = Scale::kMetric;

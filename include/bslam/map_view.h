@@ -27,10 +27,14 @@ class BSLAM_EXPORT MapView {
   struct Keyframe {
     int id = -1;               // unique within a run, also after removal
     std::int64_t time_ns = 0;  // time of its frame, by the clock of the recording
-    // Pose of camera 0 of the rig that recorded it, in the world frame of its submap; metres if scale() is metric.
+    // Pose of camera 0 of the rig that recorded it, in the world frame of its submap; metres if scale() is metric. It
+    // is the camera of rig(), by which landmarks project into the images. If the calibration was refined, camera 0 may
+    // be turned in the body by up to a degree or so, against the camera as it was calibrated, whose poses
+    // FrameResult::T_world_cam0 and trajectories contain. Poses of the body are the same in all of them.
     Pose T_world_cam0;
-    int parent = -1;  // id of its parent in the submap's spanning tree; -1 for the root
-    int submap = -1;  // id of the root keyframe of its submap
+    int parent = -1;    // id of its parent in the submap's spanning tree; -1 for the root
+    int submap = -1;    // id of the root keyframe of its submap
+    Pose T_world_body;  // of the body frame; T_world_body * rig().camera(i).T_body_cam is the pose of its camera i
   };
   struct Landmark {
     int id = -1;
@@ -62,7 +66,7 @@ class BSLAM_EXPORT MapView {
   std::size_t num_landmarks() const;
   std::size_t num_observations() const;
   // All cameras of the map, without masks: those of the first run, then those of other rigs that have continued the
-  // map.
+  // map. Calibrations that were refined are those after the refinement.
   Rig rig() const;
 
   std::vector<Keyframe> keyframes() const;  // in order of id

@@ -9,6 +9,7 @@
 #include "api/map_view_impl.h"
 #include "api/rig_impl.h"
 #include "map/rigs_of_map.h"
+#include "rig_formats/rig_file.h"
 #include "storage/map_file.h"
 
 namespace bslam {
@@ -55,7 +56,9 @@ Scale MapView::scale() const { return api::to_scale(impl_->map->scale()); }
 std::size_t MapView::num_keyframes() const { return impl_->map->num_keyframes(); }
 std::size_t MapView::num_landmarks() const { return impl_->map->num_landmarks(); }
 std::size_t MapView::num_observations() const { return impl_->map->num_observations(); }
-Rig MapView::rig() const { return api::make_rig(impl_->map->rig()); }
+Rig MapView::rig() const {
+  return api::make_rig(rig_formats::without(impl_->map->rig(), rig_formats::Droppable::kMasks));
+}
 
 std::vector<MapView::Keyframe> MapView::keyframes() const {
   const map::BundledMap& map = *impl_->map;
@@ -65,9 +68,10 @@ std::vector<MapView::Keyframe> MapView::keyframes() const {
   out.reserve(map.num_keyframes());
   for (const KeyframeId k : map.keyframe_ids()) {
     const map::BundledKeyframe& keyframe = map.keyframe(k);
-    const geometry::SE3& T_cam0_rig = map.rig().cam_from_rig(camera_0_of(keyframe, first_of_rig));
-    out.push_back({k.value(), keyframe.frame->time_ns, api::to_pose((T_cam0_rig * keyframe.T_rig_world).inverse()),
-                   keyframe.parent.value(), submap[k.index()]});
+    const std::size_t camera_0 = camera_0_of(keyframe, first_of_rig);
+    const geometry::SE3 T_world_cam0 = (map.rig().cam_from_rig(camera_0) * keyframe.T_rig_world).inverse();
+    out.push_back({k.value(), keyframe.frame->time_ns, api::to_pose(T_world_cam0), keyframe.parent.value(),
+                   submap[k.index()], api::to_pose(T_world_cam0 * map.rig().body_from_cam(camera_0).inverse())});
   }
   return out;
 }

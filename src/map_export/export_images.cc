@@ -8,6 +8,7 @@
 #include "map_export/nerfstudio.h"
 #include "map_export/point_cloud.h"
 #include "rig_formats/bslam_rig.h"
+#include "rig_formats/rig_file.h"
 #include "storage/submaps.h"
 
 namespace bslam::map_export {
@@ -55,6 +56,11 @@ std::vector<std::string> nerfstudio_paths(const Exporter& exporter) {
   return paths;
 }
 
+// The masks themselves are not exported.
+std::string rig_without_masks(const camera::Rig& rig) {
+  return rig_formats::rig_to_yaml(rig_formats::without(rig, rig_formats::Droppable::kMasks));
+}
+
 Result<AtomicFolder> folder_of(const Exporter& exporter) {
   return AtomicFolder::create(exporter.request.out, exporter.request.overwrite);
 }
@@ -85,7 +91,7 @@ Status write_undistorted(Exporter& exporter, const AtomicFolder& folder) {
   std::vector<camera::RigCamera> cameras;
   for (std::size_t c = 0; c < exporter.map().rig().size(); ++c)
     cameras.push_back({exporter.cameras.camera(c), exporter.map().rig().body_from_cam(c)});
-  return folder.write("rig.yaml", rig_formats::rig_to_yaml(camera::Rig(std::move(cameras))));
+  return folder.write("rig.yaml", rig_without_masks(camera::Rig(std::move(cameras))));
 }
 
 Status export_colmap(Exporter& exporter) {
@@ -132,7 +138,7 @@ Status export_folder(Exporter& exporter) {
   auto folder = folder_of(exporter);
   if (!folder) return folder.error();
   if (Status s = folder->write("points.ply", landmarks_ply(exporter.selection, colours)); !s) return s;
-  if (Status s = folder->write("rig.yaml", rig_formats::rig_to_yaml(exporter.map().rig())); !s) return s;
+  if (Status s = folder->write("rig.yaml", rig_without_masks(exporter.map().rig())); !s) return s;
   if (Status s = write_keyframes(exporter, *folder); !s) return s;
   const auto model = colmap_model(exporter.selection, exporter.images, exporter.cameras, colours);
   if (model) {
