@@ -46,8 +46,9 @@ struct CameraEvent {
 // Functions that a System calls to report events. Each may be empty. They are called by the thread that calls process()
 // or finish() (or create(), see `log`), before that call returns; events of background threads are reported during the
 // next of these calls. A callback may read the map, but must not call process(), finish() or trajectory(), which return
-// an error then, and must not destroy the System. An exception thrown by a callback is caught and returned as the error
-// of the call, whose result is lost; the System remains usable.
+// an error then, and must not destroy the System. An exception thrown by a callback is caught, and the
+// first one is returned as the error of the call, whose result is lost; every event is reported nevertheless, once, and
+// the System remains usable.
 struct Callbacks {
   std::function<void(const KeyframeEvent&)> keyframe;
   std::function<void(const LoopEvent&)> loop;
@@ -61,7 +62,9 @@ struct Callbacks {
 struct Startup {
   std::filesystem::path map = {};         // saved map to continue after relocalising in it; empty: a new map
   std::filesystem::path vocabulary = {};  // bslam or DBoW2 text format; empty: the one within the library
-  bool place_recognition = true;          // false: no loop closing; a lost rig is only recovered near the place of loss
+  // False: no loop closing; a lost rig is only recovered near the place of loss, and the map is saved without visual
+  // words, so that no rig can be found in it later. A map cannot be continued without place recognition.
+  bool place_recognition = true;
   // Minimum number of latest frames that trajectory() returns. Older frames are discarded, so that memory grows with
   // the map only. 0: all frames are kept.
   std::size_t history_frames = 0;
@@ -74,9 +77,9 @@ struct Startup {
 // used.
 class BSLAM_EXPORT System {
  public:
-  // Errors: inconsistent settings (localize_only without a map, calibration.refine=true without final_adjustment); a
-  // map or vocabulary that cannot be read; a map that has no keyframes or was made with a different feature pyramid or
-  // vocabulary.
+  // Errors: inconsistent settings (localize_only without a map, calibration.refine=true without final_adjustment, a map
+  // without place recognition); a map or vocabulary that cannot be read; a map that has no keyframes or was made with a
+  // different feature pyramid or vocabulary.
   static Result<System> create(const Rig& rig, const Config& config, Startup startup = {});
   System(System&& other) noexcept;
   System& operator=(System&& other) noexcept;

@@ -3,19 +3,35 @@
 #include <fmt/format.h>
 
 #include "api/frame_conversion.h"
+#include "api/guard.h"
 #include "api/map_view_impl.h"
 
 namespace bslam::api {
 
-void Notifier::log(LogLevel level, const std::string& line) const {
-  if (callbacks_.log) callbacks_.log(level, line);
+void Notifier::begin(const char* name) {
+  name_ = name;
+  failure_ = {};
 }
 
-void Notifier::started(const Rig& rig, const std::string& map_warning) {
-  if (!callbacks_.log) return;
+template <class Callback, class... Arguments>
+void Notifier::call(const Callback& callback, const Arguments&... arguments) {
+  if (!callback) return;
+  const Status called = guarded(name_, [&]() -> Status {
+    callback(arguments...);
+    return {};
+  });
+  if (failure_) failure_ = called;
+}
+
+void Notifier::log(LogLevel level, const std::string& line) { call(callbacks_.log, level, line); }
+
+Status Notifier::started(const char* name, const Rig& rig, const std::string& map_warning, bool map_without_words) {
+  begin(name);
   for (const std::string& note : rig.notes()) log(LogLevel::kInfo, "rig: " + note);
   for (const std::string& warning : rig.warnings()) log(LogLevel::kWarning, "rig: " + warning);
   if (!map_warning.empty()) log(LogLevel::kWarning, "map: the run that made it has found: " + map_warning);
+  if (map_without_words) log(LogLevel::kWarning, "map: it has no visual words, so that the rig cannot be found in it");
+  return failure_;
 }
 
 void Notifier::report_status(const FrameResult& frame) {
@@ -45,7 +61,7 @@ void Notifier::report_cameras(const FrameResult& frame) {
     const LogLevel level = now.state == CameraState::kOk ? LogLevel::kInfo : LogLevel::kWarning;
     log(level, fmt::format("{:.3f} s: camera {} ({}) is {}{}{}", to_seconds(frame.time_ns), c, rig_.camera(c).name,
                            to_string(now.state), now.reason.empty() ? "" : ": ", now.reason));
-    if (callbacks_.camera) callbacks_.camera({c, frame.time_ns, before, now});
+    call(callbacks_.camera, CameraEvent{c, frame.time_ns, before, now});
   }
 }
 
@@ -56,10 +72,8 @@ void Notifier::report_loops(const system::System& system) {
     const looping::LoopClosure& closure = loop.closure;
     log(LogLevel::kInfo, fmt::format("{:.3f} s: loop closed with {:.3f} s{}", to_seconds(loop.time_ns),
                                      to_seconds(loop.with_time_ns), closure.merged ? ", submaps merged" : ""));
-    if (callbacks_.loop) {
-      callbacks_.loop({closure.keyframe.value(), closure.matched_keyframe.value(), loop.time_ns, loop.with_time_ns,
-                       closure.inliers, closure.merged});
-    }
+    call(callbacks_.loop, LoopEvent{closure.keyframe.value(), closure.matched_keyframe.value(), loop.time_ns,
+                                    loop.with_time_ns, closure.inliers, closure.merged});
   }
 }
 
@@ -69,7 +83,7 @@ void Notifier::report_map(const system::System& system) {
   if (version == map_version_) return;
   map_version_ = version;
   report_loops(system);
-  if (callbacks_.map) callbacks_.map(make_map_view(std::move(map)));
+  if (callbacks_.map) call(callbacks_.map, make_map_view(std::move(map)));
 }
 
 // `reported`: the frame whose keyframe is already reported with its result.
@@ -78,23 +92,27 @@ void Notifier::report_created_keyframes(const system::System& system, FrameId re
   for (const tracking::FrameRecord& record : system.created_keyframes()) {
     if (record.result.frame == reported) continue;
     const FrameResult frame = to_frame_result(record, rig_);
-    callbacks_.keyframe({frame.keyframe_id, frame});
+    call(callbacks_.keyframe, KeyframeEvent{frame.keyframe_id, frame});
   }
 }
 
-void Notifier::processed(const FrameResult& frame, const system::System& system) {
+Status Notifier::processed(const char* name, const FrameResult& frame, const system::System& system) {
+  begin(name);
   report_status(frame);
   report_withdrawal(frame);
   report_cameras(frame);
   report_created_keyframes(system, FrameId(frame.frame));
-  if (frame.keyframe && callbacks_.keyframe) callbacks_.keyframe({frame.keyframe_id, frame});
+  if (frame.keyframe) call(callbacks_.keyframe, KeyframeEvent{frame.keyframe_id, frame});
   report_map(system);
+  return failure_;
 }
 
-void Notifier::finished(const system::System& system) {
+Status Notifier::finished(const char* name, const system::System& system) {
+  begin(name);
   report_created_keyframes(system, FrameId());
   report_map(system);
   report_loops(system);
+  return failure_;
 }
 
 }  // namespace bslam::api

@@ -52,6 +52,7 @@ struct Resources {
   system::Resources for_system;
   std::uint64_t vocabulary = 0;  // its id; 0 = none
   std::string map_warning;       // reason why the poses of the loaded map cannot be relied on; may be empty
+  bool map_without_words = false;
 };
 
 Result<Resources> load_resources(const Rig& rig, const system::Config& config, const Startup& startup) {
@@ -63,12 +64,15 @@ Result<Resources> load_resources(const Rig& rig, const system::Config& config, c
     out.vocabulary = out.for_system.vocabulary->id();
   }
   if (!startup.map.empty()) {
+    if (!startup.place_recognition)
+      return Error{"Startup", "place_recognition", "false, with a map", "true, since the rig must be found in the map"};
     auto map = storage::open_map(startup.map, api::Access::impl(rig).rig, config.feature_model().pyramid,
                                  out.for_system.vocabulary.get());
     if (!map) return map.error();
     if (const Status s = system::check_settings(config, map->map, api::Access::impl(rig).rig); !s) return s.error();
     out.for_system.map = std::move(map->map);
     out.map_warning = std::move(map->info.warning);
+    out.map_without_words = map->words_end == 0;
   }
   out.for_system.masks = api::Access::impl(rig).masks;
   out.for_system.history = startup.history_frames;
@@ -122,10 +126,8 @@ Result<FrameResult> System::Impl::process(const ImageBundle& bundle) {
     if (!refused) failure = frame.error();
     return frame;
   }
-  const Status reported = api::guarded("System::process: a callback", [&]() -> Status {
-    notifier.processed(*frame, system);
-    return {};
-  });
+  constexpr const char* kName = "System::process: a callback";
+  const Status reported = api::guarded(kName, [&] { return notifier.processed(kName, *frame, system); });
   if (!reported) return reported.error();
   return frame;
 }
@@ -142,10 +144,8 @@ Status System::Impl::finish() {
     failure = done.error();
     return done;
   }
-  return api::guarded("System::finish: a callback", [&]() -> Status {
-    notifier.finished(system);
-    return {};
-  });
+  constexpr const char* kName = "System::finish: a callback";
+  return api::guarded(kName, [&] { return notifier.finished(kName, system); });
 }
 
 Result<std::vector<Trajectory>> System::Impl::trajectories(RigFrame frame) const {
@@ -169,8 +169,10 @@ Result<System> System::create(const Rig& rig, const Config& config, Startup star
     if (const Status status = system::check_config(settings, !startup.map.empty()); !status) return status.error();
     auto resources = load_resources(rig, settings, startup);
     if (!resources) return resources.error();
+    const bool without_words = resources->map_without_words;
     auto impl = std::make_unique<Impl>(rig, settings, *std::move(resources), std::move(startup.callbacks));
-    impl->notifier.started(rig, impl->map_warning);
+    const Status started = impl->notifier.started("System::create", rig, impl->map_warning, without_words);
+    if (!started) return started.error();
     return System(std::move(impl));
   });
 }

@@ -133,10 +133,15 @@ void note_report_size(session::SessionResult& result, const system::Config& conf
   session::add_largest(result.record.memory, "data of the report", data.size());
 }
 
-// The warning about a loaded map.
-std::vector<std::string> warnings_of_map(const std::string& file, const std::string& warning) {
-  if (warning.empty()) return {};
-  return {file + ": the run that made this map has found: " + warning};
+// The warnings about the loaded map, if there is one.
+std::vector<std::string> warnings_of_map(const std::optional<storage::SavedMap>& loaded) {
+  std::vector<std::string> out;
+  if (!loaded) return out;
+  const std::string &file = loaded->file, &warning = loaded->info.warning;
+  if (!warning.empty()) out.push_back(file + ": the run that made this map has found: " + warning);
+  if (loaded->words_end == 0)
+    out.push_back(file + ": the map has no visual words, so that the rig cannot be found in it");
+  return out;
 }
 
 // Returns the warnings after the run; the record gets those before it and of the source of the frames as well.
@@ -240,7 +245,7 @@ int run_and_write(const SlamArguments& arguments, RunInput input, session::RunCo
   auto earlier = prepare_folder(arguments);  // its results come back if this run has none
   if (!earlier) return report_error(earlier.error());
   if (*view) std::fprintf(stderr, "view: %s\n", (*view)->url().c_str());
-  const std::vector<std::string> of_map = warnings_of_map(arguments.load_map, map_warning);
+  const std::vector<std::string> of_map = warnings_of_map(*loaded);
   if (log_verbosity(arguments.log_level) >= LogVerbosity::kWarning) print_warnings(of_map);
   if (const Status s = input.before ? input.before() : Status(); !s) return report_error(s.error());
 

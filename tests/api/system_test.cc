@@ -147,6 +147,31 @@ TEST_F(PublicSystem, TheMapCanBeReadSavedAndContinued) {
   EXPECT_FALSE(System::create(TexturedWall::rig(), pyramid, {.map = file}));
 }
 
+// The rig could not be found in the map, and the map would be saved again without its words.
+TEST_F(PublicSystem, DoesNotContinueAMapWithoutPlaceRecognition) {
+  const TemporaryFolder folder;
+  const auto with_words = folder.path() / "with.bmap", without = folder.path() / "without.bmap";
+  for (const bool recognition : {true, false}) {
+    auto system = make_system({.place_recognition = recognition});
+    process(system, 0, 20);
+    ASSERT_TRUE(system.save_map(recognition ? with_words : without));
+  }
+  const auto blind = System::create(TexturedWall::rig(), sequential(), {.map = with_words, .place_recognition = false});
+  ASSERT_FALSE(blind);
+  EXPECT_NE(blind.error().message().find("place_recognition"), std::string::npos) << blind.error().message();
+  const auto warnings = [](const std::filesystem::path& map) {
+    std::size_t count = 0;
+    Startup startup{.map = map};
+    startup.callbacks.log = [&](LogLevel level, std::string_view line) {
+      count += level == LogLevel::kWarning && line.find("no visual words") != std::string_view::npos;
+    };
+    EXPECT_TRUE(System::create(TexturedWall::rig(), sequential(), startup));
+    return count;
+  };
+  EXPECT_EQ(warnings(with_words), 0u);
+  EXPECT_EQ(warnings(without), 1u);
+}
+
 TEST_F(PublicSystem, ReturnsErrorsForInvalidCalls) {
   auto system = make_system();
   process(system, 0, 3);
@@ -233,6 +258,32 @@ TEST_F(PublicSystem, ReturnsExceptionsOfCallbacksAndRemainsUsable) {
   ASSERT_FALSE(first);
   EXPECT_NE(first.error().message().find("full disk"), std::string::npos);
   EXPECT_TRUE(system.process(wall_.bundle(1)).value().tracking());
+}
+
+TEST_F(PublicSystem, ReportsAllEventsAlthoughCallbacksThrow) {
+  std::vector<int> keyframes;
+  std::size_t maps = 0, cameras = 0;
+  Startup startup;
+  startup.callbacks.keyframe = [&](const KeyframeEvent& e) {
+    keyframes.push_back(e.keyframe);
+    throw std::runtime_error("keyframe " + std::to_string(keyframes.size()));
+  };
+  startup.callbacks.map = [&](const MapView&) { throw ++maps; };
+  startup.callbacks.camera = [&](const CameraEvent&) { throw ++cameras; };
+  auto system = make_system(startup);
+  const auto first = system.process(wall_.bundle(0));
+  ASSERT_FALSE(first);
+  EXPECT_NE(first.error().message().find("keyframe 1"), std::string::npos) << first.error().message();
+  EXPECT_EQ(maps, 1u) << "the map has changed as well";
+  for (int k = 1; k < kFrames; ++k) {
+    ImageBundle bundle = wall_.bundle(k);
+    if (k == 10) bundle.images[1].data = nullptr;
+    (void)system.process(bundle);
+  }
+  (void)system.finish();
+  EXPECT_EQ(cameras, 2u) << "out, and again ok";
+  EXPECT_EQ(keyframes.size(), system.map().num_keyframes());
+  EXPECT_TRUE(std::ranges::is_sorted(keyframes, std::less_equal<>())) << "none is reported twice";
 }
 
 TEST_F(PublicSystem, DiscardsFramesBeyondItsHistory) {
