@@ -134,7 +134,7 @@ def test_requests_that_cannot_be_met(recordings, tmp_path):
     with pytest.raises(bslam.Error, match="cannot open .*nowhere"):
         map_recordings([tmp_path / "nowhere"], tmp_path / "site")
     with pytest.raises(bslam.Error, match="expected different names"):
-        map_recordings([recordings[0], tmp_path / "a"], tmp_path / "site")
+        map_recordings([recordings[0], recordings[1], recordings[0]], tmp_path / "site")
     (tmp_path / "notes.txt").write_text("mine")
     with pytest.raises(bslam.Error, match="--out: found a folder that is not empty"):
         map_recordings(recordings, tmp_path)

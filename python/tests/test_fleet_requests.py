@@ -2,6 +2,8 @@
 
 import json
 import os
+import re
+import signal
 import subprocess
 import sys
 
@@ -13,6 +15,7 @@ pytest.importorskip("distributed", reason="distributed is not installed: the fle
 from bslam.fleet import map_recordings
 from bslam.fleet._cache import content_of
 from bslam.fleet._files import shared_rig
+from bslam.fleet._site import _named
 from bslam.fleet._sketch import likely_pairs
 from conftest import RIG
 from distributed import Client, LocalCluster
@@ -30,6 +33,17 @@ def fleet(*arguments):
     command = [sys.executable, "-m", "bslam.fleet", "map", *map(str, arguments)]
     done = subprocess.run(command, capture_output=True, text=True)
     return done.returncode, done.stdout, done.stderr
+
+
+def test_interruption_is_one_line(recording, tmp_path):
+    command = [sys.executable, "-m", "bslam.fleet", "map", recording.folder, "--out", tmp_path / "site", "--workers=2"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True) as process:
+        assert process.stderr.readline().startswith("dashboard: ")
+        os.killpg(process.pid, signal.SIGINT)  # as the terminal does it
+        errors = process.stderr.read()
+    assert process.returncode == 130
+    (line,) = [line for line in errors.splitlines() if line.strip() and not line.startswith("maps ")]
+    assert line == "bslam: interrupted; the same command continues"
 
 
 def test_no_maps_have_no_likely_pairs():
@@ -98,6 +112,66 @@ def test_wrong_request_is_one_line(recording, tmp_path, arguments, message):
         return text
 
     assert fleet(recording.folder, *map(filled, arguments)) == (2, "", f"bslam: {filled(message)}\n")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["map"], r"bslam: command line: .*DATA, --out \(see bslam fleet map --help\)\n"),
+        (["map", "a", "--out=b", "--workers=two"], r"bslam: command line: .*--workers.*'two' \(see .*\)\n"),
+        (["mop"], r"bslam: command line: .*'mop'.*\n"),
+        ([], r"bslam: command line: .*COMMAND.*\n"),
+    ],
+)
+def test_wrong_arguments_are_one_line(arguments, message):
+    done = subprocess.run([sys.executable, "-m", "bslam.fleet", *arguments], capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert re.fullmatch(message, done.stderr), done.stderr
+
+
+def test_names_that_are_equal_are_those_of_the_folders_above(tmp_path):
+    paths = ["robot1/monday", "robot1/tuesday", "robot2/monday", "east/robot3/sunday", "west/robot3/sunday"]
+    for path in paths:
+        (tmp_path / path).mkdir(parents=True)
+    data = [*(tmp_path / path for path in paths), "s3://bucket/robot4/monday"]
+    assert [(r.name, r.data) for r in _named(data)] == [
+        ("east_robot3_sunday", f"{tmp_path}/east/robot3/sunday"),
+        ("robot1_monday", f"{tmp_path}/robot1/monday"),
+        ("robot2_monday", f"{tmp_path}/robot2/monday"),
+        ("robot4_monday", "s3://bucket/robot4/monday"),
+        ("tuesday", f"{tmp_path}/robot1/tuesday"),
+        ("west_robot3_sunday", f"{tmp_path}/west/robot3/sunday"),
+    ]
+    with pytest.raises(bslam.Error, match="expected different names"):
+        _named([tmp_path / "robot1/monday", tmp_path / "robot1/monday/"])
+
+
+@pytest.mark.parametrize(
+    "name", ["../mine.bmap", "/etc/mine.bmap", "apart/../mine.bmap", "apart/a/b.bmap", "notes.txt"]
+)
+def test_files_that_are_no_results_are_not_deleted(recording, cluster, tmp_path, name):
+    out, mine = tmp_path / "out", tmp_path / "mine.bmap"
+    (out / "apart").mkdir(parents=True)
+    mine.write_text("precious")
+    (out / "notes.txt").write_text("precious")
+    text = json.dumps({"schema": 1, "recordings": [{"map": name, "trajectory": ""}]})
+    (out / "site.json").write_text(text)
+    with Client(cluster) as client:
+        with pytest.raises(bslam.Error, match="found another file, expected the site.json of an earlier run"):
+            map_recordings([recording.folder], out, client=client)
+        map_recordings([recording.folder], out, client=client, overwrite=True, settings=["foo=1"])
+    assert mine.read_text() == "precious"
+    assert (out / "notes.txt").read_text() == "precious"
+
+
+def test_sketch_that_is_missing_in_the_cache_is_named(recording, cluster, tmp_path):
+    with Client(cluster) as client:
+        map_recordings([recording.folder], tmp_path / "site", client=client)
+    (sketch,) = (tmp_path / "site/cache/maps").glob("*/sketch.npy")
+    sketch.unlink()
+    message = f"cannot read {sketch}: No such file or directory; delete its folder, which the same command makes again"
+    with Client(cluster) as client, pytest.raises(bslam.Error, match=f"^{re.escape(message)}$"):
+        map_recordings([recording.folder], tmp_path / "site", client=client)
 
 
 @pytest.mark.parametrize("text", ["{", "[]", '{"schema": 1}', '{"recordings": [{"name": "a"}]}', '{"recordings": [1]}'])

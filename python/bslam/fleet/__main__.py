@@ -4,12 +4,20 @@ from __future__ import annotations
 
 import argparse
 import sys
+from typing import Any, NoReturn
 
 from .._bslam import Error
 
 
+class _Parser(argparse.ArgumentParser):
+    """Errors are one line, as those of the program."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, f"bslam: command line: {message} (see {self.prog} --help)\n")
+
+
 def _arguments() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="bslam fleet", allow_abbrev=False)
+    parser = _Parser(prog="bslam fleet", allow_abbrev=False)
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     map_ = commands.add_parser("map", help="map recordings and merge the maps", allow_abbrev=False)
     add = map_.add_argument
@@ -32,18 +40,22 @@ def main() -> int:
     """Runs the command and returns its exit status."""
     options = vars(_arguments().parse_args())
     try:
-        from ._site import map_recordings
+        return _map(**options)
     except ImportError as error:
         print(f"bslam: fleet needs the Python package distributed ({error}): pip install distributed", file=sys.stderr)
         return 2
-    try:
-        site = map_recordings(options.pop("recordings"), options.pop("out"), progress=True, **options)
     except Error as error:
         print(f"bslam: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print("bslam: interrupted; the same command continues", file=sys.stderr)
         return 130
+
+
+def _map(recordings: list[str], out: str, **options: Any) -> int:
+    from ._site import map_recordings
+
+    site = map_recordings(recordings, out, progress=True, **options)
     print("\n".join(site.lines()))
     return 0 if site.sites else 3
 

@@ -5,11 +5,14 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import logging
 import os
 import pathlib
+import signal
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from multiprocessing import resource_tracker
 from typing import Any
 
 import click
@@ -32,7 +35,7 @@ class Recording:
     """A recording and its result.
 
     Attributes:
-        name: name of its output files.
+        name: name of its output files: that of its folder, with those above it if another recording has the same.
         data: path or address of the recording.
         state: joined to the map of a site; apart, with a map of its own; or failed.
         reason: why it was not joined.
@@ -112,7 +115,7 @@ def map_recordings(
 
     Raises:
         Error: a folder that is not empty or cannot be written, a file that does not exist, a calibration that cannot
-            be read, recordings of the same name, a scheduler that cannot be reached.
+            be read, a recording that is given twice, a scheduler that cannot be reached.
     """
     for option, number in (("--workers", workers), ("--partners", partners)):
         if number is not None and number < 1:
@@ -128,35 +131,68 @@ def map_recordings(
 
 
 def _named(recordings: Sequence[Path]) -> list[Recording]:
-    named: dict[str, Recording] = {}
+    """The recordings in order of name: of the last folder or, where these are equal, with the folders above it."""
+    data = []
     for given in [os.fspath(r) for r in recordings]:
-        data = given if "://" in given else str(pathlib.Path(given).absolute())
-        recording = Recording(pathlib.PurePosixPath(data).name, data)
-        if (other := named.setdefault(recording.name, recording)) is not recording:
-            raise _bslam.Error(f"{data}: found a recording with the name of {other.data}, expected different names")
-        if "://" not in data and not os.path.exists(data):
+        data.append(given if "://" in given else str(pathlib.Path(given).absolute()))
+        if "://" not in given and not os.path.exists(given):
             raise _bslam.Error(f"cannot open {given}: No such file or directory")
-    return [named[name] for name in sorted(named)]
+    parts = [[p for p in d.rpartition("://")[2].split("/") if p] for d in data]
+    depth = [1] * len(data)
+    while True:
+        names = ["_".join(p[-n:]) for p, n in zip(parts, depth, strict=True)]
+        equal = [i for i, name in enumerate(names) if names.count(name) > 1]
+        if not equal:
+            return sorted(map(Recording, names, data), key=lambda r: r.name)
+        if all(depth[i] >= len(parts[i]) for i in equal):
+            first, second = [i for i in equal if names[i] == names[equal[0]]][:2]
+            raise _bslam.Error(
+                f"{data[second]}: found a recording with the name of {data[first]}, expected different names"
+            )
+        for i in equal:
+            depth[i] += 1
 
 
 @contextlib.contextmanager
 def _connected(client: Client | None, scheduler: str | None, workers: int | None, progress: bool) -> Iterator[Client]:
-    with contextlib.ExitStack() as stack:
+    stack = contextlib.ExitStack()
+    try:
         if client is None:
             client = _local_client(stack, workers) if scheduler is None else _client_of(stack, scheduler)
         if progress:
             print(f"dashboard: {client.dashboard_link or 'none'}", file=sys.stderr)
         yield client
+    finally:
+        with _interruption_later():
+            stack.close()
+
+
+@contextlib.contextmanager
+def _interruption_later() -> Iterator[None]:
+    """An interruption (Ctrl-C) takes effect at the end. Threads and processes that are started here never see it."""
+    resource_tracker.ensure_running()  # when it starts, it would let interruptions through again
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _local_client(stack: contextlib.ExitStack, workers: int | None) -> Client:
     # If a worker is killed, its task is probably not the cause; another worker tries it again.
     stack.enter_context(dask.config.set({"distributed.scheduler.allowed-failures": 100}))
     count = workers or os.cpu_count() or 1
-    cluster = LocalCluster(n_workers=count, threads_per_worker=1, memory_limit=0, dashboard_address=":0")
-    stack.enter_context(cluster)
-    cluster.adapt(minimum=count, maximum=count)  # replaces workers that do not come back
-    return stack.enter_context(Client(cluster))
+    with _interruption_later():
+        cluster = LocalCluster(
+            n_workers=count,
+            threads_per_worker=1,
+            memory_limit=0,
+            dashboard_address=":0",
+            silence_logs=logging.CRITICAL,  # failures of tasks are reported; the rest is about those that end early
+        )
+        stack.enter_context(cluster)
+        cluster.adapt(minimum=count, maximum=count)  # replaces workers that do not come back
+        return stack.enter_context(Client(cluster))
 
 
 def _client_of(stack: contextlib.ExitStack, scheduler: str) -> Client:
@@ -244,7 +280,7 @@ class _Mapping:
     def _likely_pairs(self, maps: dict[str, Result]) -> list[tuple[str, str]]:
         metric = [key for key, m in maps.items() if m["scale"] == "metric"]
         self.reasons = {key: "the scale of its map is not metric" for key in maps if key not in metric}
-        sketches = [np.load(pathlib.Path(maps[key]["folder"], "sketch.npy")) for key in metric]
+        sketches = [_sketch_in(pathlib.Path(maps[key]["folder"])) for key in metric]
         return [(metric[i], metric[j]) for i, j in likely_pairs(sketches, self.partners)]
 
     def _compare(self, pairs: list[tuple[str, str]], maps: dict[str, Result]) -> None:
@@ -291,6 +327,16 @@ class _Mapping:
         _files.write(self.site.folder / "site.json", lambda file: file.write_text(text))
         for name in self.earlier - _files.files_of(now):
             (self.site.folder / name).unlink(missing_ok=True)
+
+
+def _sketch_in(folder: pathlib.Path) -> np.ndarray[Any, Any]:
+    try:
+        return np.load(folder / "sketch.npy")
+    except (OSError, ValueError, EOFError) as error:
+        raise _bslam.Error(
+            f"cannot read {folder / 'sketch.npy'}: {getattr(error, 'strerror', None) or error}; delete its folder, "
+            "which the same command makes again"
+        ) from error
 
 
 def _best_pairs(pairs: list[tuple[str, str]], site: dict[str, tuple[str, ...]]) -> list[tuple[str, str]]:
