@@ -104,10 +104,10 @@ def main(arguments: list[str] | None = None) -> int:
         "--connect", metavar="ADDRESS", help="send it to a viewer, such as rerun+http://127.0.0.1:9876/proxy"
     )
     options = parser.parse_args(arguments)
+    part = f"{options.save}.part"  # renamed when it is complete
     try:
         rr = _rerun()
         recording = rr.RecordingStream("bslam")
-        part = f"{options.save}.part"  # renamed when it is complete
         if options.save:
             recording.save(part)
         elif options.connect:
@@ -125,6 +125,9 @@ def main(arguments: list[str] | None = None) -> int:
     except (Error, OSError, RuntimeError) as failure:  # the last one by rerun-sdk
         print(f"bslam: {failure}", file=sys.stderr)
         return 2
+    finally:
+        if options.save:
+            pathlib.Path(part).unlink(missing_ok=True)
     return 0
 
 

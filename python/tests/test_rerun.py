@@ -1,6 +1,8 @@
+import pathlib
 import socket
 import subprocess
 import sys
+import types
 
 import bslam
 import bslam.rerun
@@ -42,6 +44,20 @@ def test_missing_package_is_one_line(recording, tmp_path):
     assert done.stderr.startswith("bslam: command line: --rerun needs the Python packages bslam and rerun-sdk, which ")
     assert done.stderr.count("\n") == 1
     assert not out.exists()
+
+
+def test_unfinished_file_is_removed_after_a_failure(tmp_path, monkeypatch, capsys):
+    class Stream:
+        def __init__(self, name):
+            pass
+
+        def save(self, file):
+            pathlib.Path(file).write_text("begun")
+
+    monkeypatch.setitem(sys.modules, "rerun", types.SimpleNamespace(RecordingStream=Stream))
+    assert bslam.rerun.main([str(tmp_path), "--save", str(tmp_path / "run.rrd")]) == 2
+    assert "found no report that can be read" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_run_is_written_for_rerun(recording, program, tmp_path, monkeypatch):
