@@ -3,10 +3,14 @@
 #include <glob.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <climits>
+#include <cstddef>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <string>
+#include <vector>
 
 namespace {
 
@@ -20,21 +24,59 @@ std::string prefix() {
   return out;
 }
 
+// The path of the interpreter of this installation: the one beside the command, or that of PATH.
+std::string interpreter(const std::string& root) {
+  std::string folders = root + "/bin:";
+  if (const char* const path = std::getenv("PATH"); path != nullptr) folders += path;
+  for (std::size_t begin = 0; begin <= folders.size();) {
+    const std::size_t end = std::min(folders.find(':', begin), folders.size());
+    const std::string file = folders.substr(begin, end - begin) + "/python3";
+    if (access(file.c_str(), X_OK) == 0) return file;
+    begin = end + 1;
+  }
+  return {};
+}
+
+// The name without links, such as python3.11, of which the folder of packages has the name as well.
+std::string real_name(const std::string& file) {
+  char path[PATH_MAX];
+  const std::string out = realpath(file.c_str(), path) != nullptr ? path : "";
+  return out.substr(out.find_last_of('/') + 1);
+}
+
+// The text as a pattern that matches itself only.
+std::string literal(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    if (std::strchr("*?[]\\", c) != nullptr) out += '\\';
+    out += c;
+  }
+  return out;
+}
+
+// The programs of all packages below the prefix.
+std::vector<std::string> programs(const std::string& root) {
+  std::vector<std::string> out;
+  for (const char* packages :
+       {"/lib*/python3*/site-packages", "/lib*/python3*/dist-packages", "/local/lib*/python3*/dist-packages", ""}) {
+    glob_t found{};
+    if (glob((literal(root) + packages + "/bslam/bin/bslam").c_str(), 0, nullptr, &found) == 0)
+      out.insert(out.end(), found.gl_pathv, found.gl_pathv + found.gl_pathc);
+    globfree(&found);
+  }
+  return out;
+}
+
 }  // namespace
 
 int main(int, char** argv) {
   const std::string root = prefix();
+  const std::string python = interpreter(root), version = "/" + real_name(python) + "/";
   // For --rerun. There is none beside commands that were installed with pip --user: python3 of PATH is used then.
-  const std::string python = root + "/bin/python3";
-  if (access(python.c_str(), X_OK) == 0) setenv("BSLAM_PYTHON", python.c_str(), 0);
-  for (const char* packages :
-       {"/lib*/python3*/site-packages", "/lib*/python3*/dist-packages", "/local/lib*/python3*/dist-packages", ""}) {
-    glob_t found{};
-    if (glob((root + packages + "/bslam/bin/bslam").c_str(), 0, nullptr, &found) == 0) {
-      execv(found.gl_pathv[found.gl_pathc - 1], argv);
-    }
-    globfree(&found);
-  }
+  if (python.starts_with(root + "/bin/")) setenv("BSLAM_PYTHON", python.c_str(), 0);
+  std::vector<std::string> found = programs(root);
+  std::ranges::stable_partition(found, [&](const std::string& p) { return p.find(version) != std::string::npos; });
+  for (const std::string& program : found) execv(program.c_str(), argv);
   std::fprintf(stderr, "bslam: cannot find the Python package below %s\n", root.c_str());
   return 1;
 }

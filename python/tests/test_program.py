@@ -1,3 +1,4 @@
+import os
 import pathlib
 import shutil
 import subprocess
@@ -52,3 +53,23 @@ def test_command_finds_the_program_in_the_package(tmp_path, packages):
     folder.mkdir(parents=True)
     (folder / "bslam").symlink_to(PROGRAM.resolve())
     assert subprocess.run(run, capture_output=True, text=True).stdout.startswith("bslam " + bslam.__version__)
+
+
+def test_command_finds_the_package_of_its_own_interpreter(tmp_path):
+    command = pathlib.Path(bslam.__file__).parents[1] / "bin/bslam"
+    if not command.exists():
+        pytest.skip("not the folder of a build")
+    root = tmp_path / "a[b] * c?"  # characters of patterns
+    (root / "bin").mkdir(parents=True)
+    shutil.copy(command, root / "bin")
+    for version in ("3.10", "3.12", "3.9"):
+        program = root / f"lib/python{version}/site-packages/bslam/bin/bslam"
+        program.parent.mkdir(parents=True)
+        program.write_text(f'#!/bin/sh\necho {version} "$BSLAM_PYTHON"\n')
+        program.chmod(0o755)
+    (root / "bin/python3.12").write_text("")
+    (root / "bin/python3.12").chmod(0o755)
+    (root / "bin/python3").symlink_to("python3.12")
+    environment = {k: v for k, v in os.environ.items() if k != "BSLAM_PYTHON"}
+    found = subprocess.run([root / "bin/bslam"], capture_output=True, text=True, env=environment)
+    assert found.stdout == f"3.12 {root}/bin/python3\n"
