@@ -13,6 +13,7 @@
 #include "benchmark/benchmark_report.h"
 #include "cli/bench_runs.h"
 #include "cli/interruption.h"
+#include "cli/print_message.h"
 #include "cli/shell_command.h"
 #include "cli/verbs.h"
 #include "cli/version.h"
@@ -124,12 +125,12 @@ Result<int> run_repeatedly(const BenchArguments& a, const Sequence& sequence, ex
     if (stop.stop_requested() && !outcome.measurement.failure.empty()) return kExitInterrupted;
     result.runs.push_back(outcome.measurement);
     if (status == kExitOk) status = outcome.status;
-    std::fprintf(stderr, "%s, run %d: %s\n", sequence.name.c_str(), run,
-                 outcome.measurement.failure.empty() ? "done" : outcome.measurement.failure.c_str());
+    print_message("{}, run {}: {}\n", sequence.name, run,
+                  outcome.measurement.failure.empty() ? "done" : outcome.measurement.failure);
     result.identical = run == 2 && a.runs > 2 && status == kExitOk && are_copies(a, sequence, mode);
     if (result.identical)
-      std::fprintf(stderr, "%s: both runs are identical, since this mode is deterministic; no further runs are made\n",
-                   sequence.name.c_str());
+      print_message("{}: both runs are identical, since this mode is deterministic; no further runs are made\n",
+                    sequence.name);
     if (const Status s = write(); !s) return s.error();
   }
   return status;
@@ -168,7 +169,7 @@ int bench(const BenchArguments& a) {
   const auto conditions = conditions_of(a, config->looping.loop.enabled);
   const auto status = run_all(a, *sequences, config->mode, conditions, interruption.token());
   if (!status) return report_error(status.error());
-  if (*status == kExitInterrupted) std::fprintf(stderr, "interrupted\n");
+  if (*status == kExitInterrupted) print_message("interrupted\n");
   if (const auto text = read_file(fs::path(a.out) / "report.md", kMaxLogBytes)) {
     std::fwrite(text->data(), 1, text->size(), stdout);
   }

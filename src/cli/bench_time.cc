@@ -1,7 +1,6 @@
 // bslam bench --time: the times of one recording by stage, and its counted work, compared with earlier ones.
 #include <fmt/format.h>
 
-#include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "base/atomic_file.h"
@@ -10,6 +9,7 @@
 #include "benchmark/time_comparison.h"
 #include "cli/bench_runs.h"
 #include "cli/interruption.h"
+#include "cli/print_message.h"
 #include "cli/shell_command.h"
 #include "cli/verbs.h"
 #include "cli/version.h"
@@ -44,7 +44,7 @@ Result<TimedRun> run_once(const BenchArguments& a, int run, const std::stop_toke
   const auto end = run_program(kThisProgram, words, log, stop);
   if (!end) return end.error();
   if (const std::string failure = failure_of(*end, log); !failure.empty()) {
-    std::fprintf(stderr, "bslam: run %d: %s\n", run, failure.c_str());
+    print_message("bslam: run {}: {}\n", run, failure);
     return TimedRun{{}, end->signal > 0 ? kExitFailed : end->exit_status};
   }
   const auto text = read_file(folder / "summary.json", kMaxLogBytes);
@@ -118,7 +118,7 @@ Result<int> run_all(const BenchArguments& a, const std::stop_token& stop, std::v
     if (!timed) return timed.error();
     if (timed->status != kExitOk) return timed->status;
     summaries.push_back(std::move(timed->summary));
-    std::fprintf(stderr, "run %d of %d: done\n", run, a.runs);
+    print_message("run {} of {}: done\n", run, a.runs);
   }
   return kExitOk;
 }
@@ -152,7 +152,7 @@ int time_and_compare(const BenchArguments& a, const std::string& data, const std
   std::vector<Summary> summaries;
   const auto status = run_all(a, interruption.token(), summaries);
   if (!status) return report_error(status.error());
-  if (*status == kExitInterrupted) std::fprintf(stderr, "interrupted\n");
+  if (*status == kExitInterrupted) print_message("interrupted\n");
   if (*status != kExitOk) return *status;
   const TimeReport report = benchmark::make_time_report(conditions_of(a, data), summaries);
   std::optional<benchmark::TimeComparison> comparison;

@@ -1,7 +1,6 @@
 #include "cli/config_arguments.h"
 
-#include <cstdio>
-
+#include "cli/print_message.h"
 #include "yaml/config_file.h"
 
 namespace bslam::cli {
@@ -22,7 +21,7 @@ Result<system::Config> resolve_config(const ConfigArguments& arguments, system::
   for (const std::string& setting : arguments.settings) {
     if (const Status s = yaml::apply_setting(table, setting); !s) return s.error();
   }
-  for (const std::string& warning : table.warnings()) std::fprintf(stderr, "warning: %s\n", warning.c_str());
+  for (const std::string& warning : table.warnings()) print_message("warning: {}\n", warning);
   return config;
 }
 

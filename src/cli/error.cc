@@ -1,12 +1,12 @@
-#include <cstdio>
 #include <filesystem>
 
+#include "cli/print_message.h"
 #include "cli/verbs.h"
 
 namespace bslam::cli {
 
 int report_error(const Error& error) {
-  std::fprintf(stderr, "bslam: %s\n", error.message().c_str());
+  print_message("bslam: {}\n", error.message());
   return kExitBadInput;
 }
 

@@ -10,7 +10,8 @@
 #include <string>
 
 #include "base/atomic_file.h"
-#include "cli/output_file.h"
+#include "base/output_file.h"
+#include "cli/print_message.h"
 #include "cli/trajectory_camera.h"
 #include "cli/verbs.h"
 #include "evaluation/trajectory_error.h"
@@ -46,9 +47,9 @@ AlignMode align_mode(const std::string& name) {
 void note_of_body(const camera::Rig& rig, const std::filesystem::path& file) {
   const geometry::SE3& T_body_cam0 = rig.body_from_cam(0);
   if (!T_body_cam0.matrix().isIdentity(0)) return;
-  fmt::print(stderr,
-             "note: {} gives camera 0 no pose on the body other than the identity: the body is taken to be camera 0\n",
-             file.string());
+  print_message(
+      "note: {} gives camera 0 no pose on the body other than the identity: the body is taken to be camera 0\n",
+      file.string());
 }
 
 // The plot is written as SVG, and its file name must end in .svg.
@@ -70,8 +71,7 @@ Result<std::optional<geometry::SE3>> frame_of_truth(const EvalArguments& argumen
   if (frame == "body" && arguments.gt_frame == "body") return std::optional<geometry::SE3>();
   if (arguments.gt_frame != "body" && !arguments.rig) {
     if (!frame.empty() && frame != "cam0") {
-      fmt::print(
-          stderr,
+      print_message(
           "note: {} contains poses of {}; the ground truth is taken to be of the same frame. --rig FILE compares "
           "it with poses of camera 0\n",
           arguments.estimate, frame);
@@ -98,8 +98,7 @@ void move_to_one_frame(const geometry::SE3& T_cam_frame, const EvalArguments& ar
   const bool metric = evaluation::read_comments(arguments.estimate).scale == "metric";
   const double distance_m = evaluation::move_to_one_frame(T_cam_frame, metric, estimate, truth);
   if (distance_m == 0) return;
-  fmt::print(
-      stderr,
+  print_message(
       "note: the unit of {} is not the metre: the ground truth was moved by {:.3f} m to its camera, by the rig and "
       "the orientations of the ground truth\n",
       arguments.estimate, distance_m);
@@ -153,16 +152,14 @@ Result<TrajectoryEvaluation> evaluate_files(const EvalArguments& arguments) {
   auto ground_truth = evaluation::read_trajectory(arguments.ground_truth, arguments.times);
   if (!ground_truth) return ground_truth.error();
   if (arguments.gt_frame == "cam0" && std::filesystem::path(arguments.ground_truth).extension() == ".csv") {
-    std::fprintf(
-        stderr,
+    print_message(
         "note: EuRoC ground truth contains poses of the body; use --gt-frame body --rig FILE to compare it with "
         "a camera\n");
   }
   if (const std::string scale = evaluation::read_comments(arguments.estimate).scale;
       scale != "metric" && arguments.align != "sim3") {
-    fmt::print(stderr,
-               "note: the scale of {} is {}, so that its errors are mainly those of the scale; use --align sim3\n",
-               arguments.estimate, scale);
+    print_message("note: the scale of {} is {}, so that its errors are mainly those of the scale; use --align sim3\n",
+                  arguments.estimate, scale);
   }
   const auto T_cam_frame = frame_of_truth(arguments);
   if (!T_cam_frame) return T_cam_frame.error();

@@ -8,8 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "base/output_file.h"
 #include "camera/camera_name.h"
-#include "cli/output_file.h"
+#include "cli/print_message.h"
 #include "cli/trajectory_camera.h"
 #include "cli/verbs.h"
 #include "evaluation/association.h"
@@ -87,7 +88,7 @@ Result<SE3> upright_axes_of(const Trajectory& trajectory, const TrajectoryArgume
     if (!parsed) return parsed.error();
     up = *parsed;
   } else {
-    std::fprintf(stderr, "note: %s\n", map_export::upward_note().c_str());
+    print_message("note: {}\n", map_export::upward_note());
   }
   if (!arguments.map) {
     std::vector<SE3> poses;
@@ -122,8 +123,7 @@ Result<SE3> wanted_frame(const TrajectoryArguments& arguments) {
   const auto T_cam_frame = frame_in_camera(frame, arguments);
   const double distance_m = T_cam_frame ? T_cam_frame->translation().norm() : 0;
   if (distance_m > 0 && evaluation::read_comments(arguments.file).scale != "metric") {
-    fmt::print(
-        stderr,
+    print_message(
         "note: the camera is {:.3f} m away from {}, but the unit of {} is not the metre: the distance is added to "
         "the path as it is\n",
         distance_m, frame, arguments.file);

@@ -4,9 +4,9 @@
 #include <nlohmann/json.hpp>
 
 #include "base/atomic_file.h"
+#include "base/output_file.h"
 #include "cli/config_arguments.h"
 #include "cli/dataset_arguments.h"
-#include "cli/output_file.h"
 #include "cli/verbs.h"
 #include "dataset/frame_reader.h"
 #include "image_decoding/image_file.h"

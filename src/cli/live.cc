@@ -17,6 +17,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/output_file.h"
 #include "base/split.h"
 #include "capture/live_cameras.h"
 #include "capture/pixels.h"
@@ -25,7 +26,7 @@
 #include "capture/v4l2_device.h"
 #include "capture/video_modes.h"
 #include "cli/interruption.h"
-#include "cli/output_file.h"
+#include "cli/print_message.h"
 #include "cli/progress_bar.h"
 #include "cli/run_messages.h"
 #include "cli/shell_command.h"
@@ -136,8 +137,8 @@ capture::OpenDevice opener(const std::vector<std::string>& paths) {
 void print_cameras(const LiveRig& rig, const std::vector<capture::Stream>& streams) {
   for (std::size_t c = 0; c < streams.size(); ++c) {
     const capture::Stream& s = streams[c];
-    fmt::print(stderr, "{} = {}: {} {}x{}{}\n", rig.rig.camera(c).name, rig.paths[c], capture::fourcc_text(s.pixels),
-               s.width, s.height, s.fps ? fmt::format(", {:.4g} frames/s", *s.fps) : "");
+    print_message("{} = {}: {} {}x{}{}\n", rig.rig.camera(c).name, rig.paths[c], capture::fourcc_text(s.pixels),
+                  s.width, s.height, s.fps ? fmt::format(", {:.4g} frames/s", *s.fps) : "");
   }
 }
 
@@ -162,9 +163,9 @@ std::optional<std::string> end_recording(capture::Recorder& recorder, const std:
   std::optional<std::string> warning;
   if (const Status written = recorder.finish(); !written)
     warning = written.error().message() + "; the recording ends there";
-  if (warning) fmt::print(stderr, "warning: {}\n", *warning);
-  fmt::print(stderr, "recorded: {} frames, {:.1f} MB in {}\n", recorder.frames(),
-             1e-6 * static_cast<double>(recorder.bytes()), file);
+  if (warning) print_message("warning: {}\n", *warning);
+  print_message("recorded: {} frames, {:.1f} MB in {}\n", recorder.frames(),
+                1e-6 * static_cast<double>(recorder.bytes()), file);
   return warning;
 }
 
@@ -278,7 +279,7 @@ int live(const LiveArguments& a) {
                                .request = *request,
                                .open = opener(rig->paths),
                                .sync_tolerance_s = config->io.sync_tolerance};
-  if (!quiet) options.say = [](const std::string& line) { fmt::print(stderr, "warning: {}\n", line); };
+  if (!quiet) options.say = [](const std::string& line) { print_message("warning: {}\n", line); };
   auto cameras = capture::LiveCameras::open(rig->rig, std::move(options));
   if (!cameras) return report_error(cameras.error());
   return run_live(a, *config, *rig, interruption, **cameras);

@@ -7,15 +7,16 @@
 
 #include "cli/command_line_error.h"
 #include "cli/option_values.h"
+#include "cli/print_message.h"
+#include "cli/standard_streams.h"
 #include "cli/verbs.h"
 #include "cli/version.h"
 
-int main(int argc, char** argv) {
-  using namespace bslam::cli;
-#ifdef __GLIBC__
-  // One heap for all threads: images are allocated in one and released in another, which fragments a heap per thread.
-  mallopt(M_ARENA_MAX, 1);
-#endif
+namespace bslam::cli {
+namespace {
+
+// Runs the command that the arguments name, and returns its exit status.
+int run_command(int argc, char** argv) {
   CLI::App app{"bslam: visual SLAM for rigs of any number of cameras"};
   app.set_version_flag("--version", version_text());
   app.require_subcommand(1);
@@ -42,9 +43,27 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& e) {
     if (e.get_exit_code() == 0) return app.exit(e);  // help and version
     return report_error(command_line_error(app, e));
-  } catch (const std::exception& e) {  // for example out of memory; not an error in the request
-    std::fprintf(stderr, "bslam: %s\n", e.what());
+  } catch (const std::exception& e) {              // for example out of memory; not an error in the request
+    if (std::ferror(stdout) != 0) return kExitOk;  // fmt::print: finish_stdout reports it
+    print_message("bslam: {}\n", e.what());
     return kExitFailed;
   }
   return exit_status;
+}
+
+}  // namespace
+}  // namespace bslam::cli
+
+int main(int argc, char** argv) {
+  using namespace bslam::cli;
+#ifdef __GLIBC__
+  // One heap for all threads: images are allocated in one and released in another, which fragments a heap per thread.
+  mallopt(M_ARENA_MAX, 1);
+#endif
+  open_standard_streams();
+  const int exit_status = run_command(argc, argv);
+  const bslam::Status printed = finish_stdout();
+  if (printed) return exit_status;
+  const int unprinted = report_error(printed.error());
+  return exit_status == kExitOk ? unprinted : exit_status;
 }

@@ -6,8 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "base/output_file.h"
 #include "cli/dataset_arguments.h"
-#include "cli/output_file.h"
+#include "cli/print_message.h"
 #include "cli/verbs.h"
 #include "dataset/dataset.h"
 #include "map/rigs_of_map.h"
@@ -81,7 +82,7 @@ int run_map_export(ExportArguments arguments) {
   arguments.request.data_folder = arguments.images;
   const auto report = map_export::export_map(saved->map, arguments.request);
   if (!report) return report_error(report.error());
-  for (const std::string& note : report->notes) std::fprintf(stderr, "note: %s\n", note.c_str());
+  for (const std::string& note : report->notes) print_message("note: {}\n", note);
   std::printf("%s: %s\n", arguments.request.out.c_str(), report->summary.c_str());
   return kExitOk;
 }

@@ -11,7 +11,8 @@
 #include <vector>
 
 #include "cli/config_arguments.h"
-#include "cli/output_file.h"
+#include "base/output_file.h"
+#include "cli/print_message.h"
 #include "cli/verbs.h"
 #include "cli/version.h"
 #include "session/merge_maps.h"
@@ -127,7 +128,7 @@ int map_merge(const MergeArguments& arguments) {
   if (!arguments.dry_run) {
     if (const Status s = write(*merged, **vocabulary, warnings, arguments.out); !s) return report_error(s.error());
   }
-  for (const std::string& warning : warnings) fmt::print(stderr, "warning: {}\n", warning);
+  for (const std::string& warning : warnings) print_message("warning: {}\n", warning);
   arguments.json ? print_json(*merged) : print_text(*merged);
   if (!arguments.dry_run && !arguments.json) fmt::print("{}\n", arguments.out);
   return kExitOk;

@@ -4,7 +4,7 @@
 #include <memory>
 #include <string>
 
-#include "cli/output_file.h"
+#include "base/output_file.h"
 #include "cli/verbs.h"
 #include "evaluation/trajectory_file.h"
 #include "session/transfer_trajectory.h"

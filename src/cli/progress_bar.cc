@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <utility>
 
+#include "cli/print_message.h"
+
 namespace bslam::cli {
 
 ProgressBar::ProgressBar(bool enabled, std::string unit)
@@ -16,15 +18,15 @@ void ProgressBar::show(std::size_t done, std::size_t all) {
   drawn_ = now;
   const double elapsed = std::chrono::duration<double>(now - start_).count();
   if (all == 0) {
-    std::fprintf(stderr, "\r%zu %s in %.0f s ", done, unit_.c_str(), elapsed);
+    print_message("\r{} {} in {:.0f} s ", done, unit_, elapsed);
     std::fflush(stderr);
     return;
   }
   constexpr std::size_t kWidth = 40;
   const std::size_t filled = kWidth * done / all;
   const double left = done > 0 ? elapsed * static_cast<double>(all - done) / static_cast<double>(done) : 0.0;
-  std::fprintf(stderr, "\r[%s%s] %zu/%zu %s, %.0f s left ", std::string(filled, '#').c_str(),
-               std::string(kWidth - filled, '.').c_str(), done, all, unit_.c_str(), left);
+  print_message("\r[{}{}] {}/{} {}, {:.0f} s left ", std::string(filled, '#'), std::string(kWidth - filled, '.'), done,
+                all, unit_, left);
   std::fflush(stderr);
 }
 

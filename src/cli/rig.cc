@@ -6,8 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "base/output_file.h"
 #include "cli/dataset_arguments.h"
-#include "cli/output_file.h"
+#include "cli/print_message.h"
 #include "cli/verbs.h"
 #include "rig_formats/rig_file.h"
 #include "session/rig_report.h"
@@ -81,8 +82,8 @@ int rig_convert(const ConvertArguments& arguments) {
   }
   const auto notes = rig_formats::write_rig_as(*rig, format, out);
   if (!notes) return report_error(notes.error());
-  for (const std::string& note : in->notes) std::fprintf(stderr, "note: %s\n", note.c_str());
-  for (const std::string& note : *notes) std::fprintf(stderr, "note: %s\n", note.c_str());
+  for (const std::string& note : in->notes) print_message("note: {}\n", note);
+  for (const std::string& note : *notes) print_message("note: {}\n", note);
   std::printf("%s: %zu camera%s as %s\n", out.c_str(), rig->size(), rig->size() == 1 ? "" : "s",
               std::string(rig_formats::format_name(format)).c_str());
   return kExitOk;

@@ -1,6 +1,5 @@
 // bslam run: runs the SLAM system on a recorded data set.
 #include <chrono>
-#include <cstdio>
 #include <memory>
 #include <optional>
 #include <span>
@@ -8,9 +7,10 @@
 #include <vector>
 
 #include "base/atomic_file.h"
+#include "base/output_file.h"
 #include "cli/dataset_arguments.h"
 #include "cli/interruption.h"
-#include "cli/output_file.h"
+#include "cli/print_message.h"
 #include "cli/progress_bar.h"
 #include "cli/run_messages.h"
 #include "cli/shell_command.h"
@@ -55,7 +55,7 @@ void print_sources(const dataset::Dataset& dataset) {
   const char* const how = dataset.sources_by_name ? "by their names"
                           : folders               ? "in the order of their names; choose with --topics"
                                                   : "choose with --topics";
-  if (!text.empty()) std::fprintf(stderr, "cameras: %s (%s)\n", text.c_str(), how);
+  if (!text.empty()) print_message("cameras: {} ({})\n", text, how);
 }
 
 void print_before(const dataset::Dataset& dataset, const DatasetArguments& data, LogVerbosity verbosity) {

@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 
 #include <cstddef>
-#include <cstdio>
 #include <vector>
 
+#include "cli/print_message.h"
 #include "session/summary.h"
 
 namespace bslam::cli {
@@ -37,8 +37,8 @@ void print_stage_statistics(const session::RunRecord& record) {
     for (const session::StageSample& sample : stage.samples) durations_ms.push_back(sample.ms);
     const session::DurationStatistics s = session::duration_statistics(std::move(durations_ms));
     if (s.count == 0) continue;
-    fmt::print(stderr, "info: stage {}: {} calls, median {:.2f} ms, 95 % {:.2f} ms, maximum {:.2f} ms\n", stage.name,
-               s.count, s.median, s.p95, s.max);
+    print_message("info: stage {}: {} calls, median {:.2f} ms, 95 % {:.2f} ms, maximum {:.2f} ms\n", stage.name,
+                  s.count, s.median, s.p95, s.max);
   }
 }
 
@@ -51,8 +51,8 @@ void print_frames(const session::RunRecord& record) {
       for (const tracking::CameraCounts& camera : frame.record->final_result().cameras) inliers += camera.inliers;
       frame_ms = frame.record->frame_ms;
     }
-    fmt::print(stderr, "debug: frame {} at {:.3f} s: {}, {} inliers, {:.2f} ms\n", i, frame.time_s, outcome_text(frame),
-               inliers, frame_ms);
+    print_message("debug: frame {} at {:.3f} s: {}, {} inliers, {:.2f} ms\n", i, frame.time_s, outcome_text(frame),
+                  inliers, frame_ms);
   }
 }
 

@@ -3,8 +3,9 @@
 #include <fmt/format.h>
 
 #include <cstddef>
-#include <cstdio>
 #include <string_view>
+
+#include "cli/print_message.h"
 
 namespace bslam::cli {
 
@@ -102,7 +103,7 @@ void print_verdict(const session::RunRecord& record) {
 }  // namespace
 
 void print_warnings(const std::vector<std::string>& warnings) {
-  for (const std::string& warning : warnings) fmt::print(stderr, "warning: {}\n", warning);
+  for (const std::string& warning : warnings) print_message("warning: {}\n", warning);
 }
 
 void print_result(const session::RunRecord& record, const std::string& out) {

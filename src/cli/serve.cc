@@ -14,6 +14,7 @@
 #include "base/cores.h"
 #include "cli/config_arguments.h"
 #include "cli/interruption.h"
+#include "cli/print_message.h"
 #include "cli/verbs.h"
 #include "image_decoding/image_file.h"
 #include "map/rigs_of_map.h"
@@ -74,12 +75,11 @@ Error of_options(const Error& error) {
 
 void print_warnings_of(const ServeArguments& a, const map_service::MapSource& source) {
   if (!source.warning.empty())
-    std::fprintf(stderr, "warning: %s: the run that made this map has found: %s\n", a.map.c_str(),
-                 source.warning.c_str());
+    print_message("warning: {}: the run that made this map has found: {}\n", a.map, source.warning);
   const bool local = a.address.starts_with("127.") || a.address == "::1";
   if (!local && a.token.empty())
-    std::fprintf(stderr, "warning: --address %s without --token: everybody who reaches this port can use the service\n",
-                 a.address.c_str());
+    print_message("warning: --address {} without --token: everybody who reaches this port can use the service\n",
+                  a.address);
 }
 
 map_service::ServiceOptions service_options(const ServeArguments& a) {

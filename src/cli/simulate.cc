@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cstdio>
 #include <map>
 #include <memory>
 #include <optional>
@@ -11,6 +10,7 @@
 
 #include "base/cores.h"
 #include "cli/interruption.h"
+#include "cli/print_message.h"
 #include "cli/progress_bar.h"
 #include "cli/verbs.h"
 #include "rig_formats/rig_file.h"
@@ -133,7 +133,7 @@ int run_simulate(const SimulateArguments& arguments) {
       fmt::print("{}: already complete\n", arguments.folder);
       break;
     case simulator::SimulationOutcome::kInterrupted:
-      fmt::print(stderr, "bslam: interrupted; repeat the same command to continue\n");
+      print_message("bslam: interrupted; repeat the same command to continue\n");
       return kExitInterrupted;
   }
   return kExitOk;

@@ -11,8 +11,9 @@
 
 #include "base/atomic_file.h"
 #include "base/option_table.h"
+#include "base/output_file.h"
 #include "cli/allocation_count.h"
-#include "cli/output_file.h"
+#include "cli/print_message.h"
 #include "cli/rerun.h"
 #include "cli/run_messages.h"
 #include "cli/shell_command.h"
@@ -70,9 +71,8 @@ void print_other_names(const std::string& file, const map::BundledMap& map, cons
     if (in_map != here) text += fmt::format("{}{} = {}", text.empty() ? "" : ", ", here, in_map);
   }
   if (!text.empty())
-    std::fprintf(stderr,
-                 "note: %s has other names for the cameras of this run, which are known by their calibrations: %s\n",
-                 file.c_str(), text.c_str());
+    print_message("note: {} has other names for the cameras of this run, which are known by their calibrations: {}\n",
+                  file, text);
 }
 
 // Reads the map of an earlier run if one is given, and checks that this run can continue with it.
@@ -89,7 +89,7 @@ Result<std::optional<storage::SavedMap>> read_map(const SlamArguments& arguments
     const char* const text = map::find_rig(map, rig)
                                  ? "has further cameras; the calibration is that of the map and is not estimated"
                                  : "was made with another rig or calibration; that of this run is kept as given";
-    std::fprintf(stderr, "note: %s %s\n", file.c_str(), text);
+    print_message("note: {} {}\n", file, text);
   }
   return std::optional(*std::move(saved));
 }
@@ -244,7 +244,7 @@ int run_and_write(const SlamArguments& arguments, RunInput input, session::RunCo
   if (!view) return report_error(view.error());
   auto earlier = prepare_folder(arguments);  // its results come back if this run has none
   if (!earlier) return report_error(earlier.error());
-  if (*view) std::fprintf(stderr, "view: %s\n", (*view)->url().c_str());
+  if (*view) print_message("view: {}\n", (*view)->url());
   const std::vector<std::string> of_map = warnings_of_map(*loaded);
   if (log_verbosity(arguments.log_level) >= LogVerbosity::kWarning) print_warnings(of_map);
   if (const Status s = input.before ? input.before() : Status(); !s) return report_error(s.error());

@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <cstdio>
 #include <string>
 
 #include "camera/camera_name.h"
+#include "cli/print_message.h"
 #include "evaluation/trajectory_file.h"
 
 namespace bslam::cli {
@@ -24,8 +24,8 @@ Result<std::size_t> camera_of_trajectory(const std::filesystem::path& trajectory
                  fmt::format("a camera number below {}", rig.size())};
   const auto chosen = static_cast<std::size_t>(*option);
   if (!frame.empty() && frame != "cam0" && named != chosen) {
-    fmt::print(stderr, "note: {} contains poses of {}, but --camera {} is {} of {}\n", trajectory.string(), frame,
-               chosen, rig.camera(chosen).name, rig_file.string());
+    print_message("note: {} contains poses of {}, but --camera {} is {} of {}\n", trajectory.string(), frame, chosen,
+                  rig.camera(chosen).name, rig_file.string());
   }
   return chosen;
 }

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <mutex>
@@ -12,6 +11,7 @@
 #include <vector>
 
 #include "base/cores.h"
+#include "cli/print_message.h"
 #include "cli/progress_bar.h"
 #include "cli/verbs.h"
 #include "dataset/training_images.h"
@@ -85,7 +85,7 @@ TrainingSet extract_all(const std::vector<std::filesystem::path>& files, const V
       set.images.push_back(std::move(*found[i]));
     } else {
       ++set.skipped;
-      fmt::print(stderr, "warning: {}; the image is skipped\n", warnings[i]);
+      print_message("warning: {}; the image is skipped\n", warnings[i]);
     }
   }
   return set;

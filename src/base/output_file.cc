@@ -1,4 +1,4 @@
-#include "cli/output_file.h"
+#include "base/output_file.h"
 
 #include <algorithm>
 #include <fstream>
@@ -6,7 +6,7 @@
 
 #include "base/atomic_file.h"
 
-namespace bslam::cli {
+namespace bslam {
 namespace {
 
 bool begins_with(const std::filesystem::path& file, std::string_view text) {
@@ -42,4 +42,4 @@ Status check_not_input(const std::string& file, const char* option, const std::v
   return Error{file, option, "a file that this command reads", "another name"};
 }
 
-}  // namespace bslam::cli
+}  // namespace bslam

@@ -8,7 +8,7 @@
 
 #include "base/result.h"
 
-namespace bslam::cli {
+namespace bslam {
 
 // Checks whether the file can be written. An existing file is replaced only if `overwrite`, and if it begins with
 // `begin` or is empty: the name of another file was a mistake.
@@ -18,4 +18,4 @@ Status check_output_file(const std::string& file, const char* option, bool overw
 // inputs are ignored.
 Status check_not_input(const std::string& file, const char* option, const std::vector<std::filesystem::path>& inputs);
 
-}  // namespace bslam::cli
+}  // namespace bslam
