@@ -9,12 +9,14 @@
 #include <csignal>
 #include <cstring>
 
+#include "base/file_descriptor.h"
+
 namespace bslam::cli {
 namespace {
 
 // Waits until the process has ended. It is not reaped before the stop callback is removed, so that its id cannot belong
 // to another process when the signal is sent.
-ProcessEnd wait_for(pid_t process, const std::stop_token& stop) {
+Result<ProcessEnd> wait_for(pid_t process, const std::stop_token& stop) {
   {
     const std::stop_callback forward(stop, [process] { ::kill(process, SIGINT); });
     siginfo_t info{};
@@ -22,10 +24,12 @@ ProcessEnd wait_for(pid_t process, const std::stop_token& stop) {
     }
   }
   int status = 0;
-  while (::waitpid(process, &status, 0) < 0 && errno == EINTR) {
+  pid_t ended = 0;
+  while ((ended = ::waitpid(process, &status, 0)) < 0 && errno == EINTR) {
   }
-  if (WIFSIGNALED(status)) return {.exit_status = 0, .signal = WTERMSIG(status)};
-  return {.exit_status = WEXITSTATUS(status), .signal = 0};
+  if (ended < 0) return system_error("wait for", "a process", "its exit status");
+  if (WIFSIGNALED(status)) return ProcessEnd{.exit_status = 0, .signal = WTERMSIG(status)};
+  return ProcessEnd{.exit_status = WEXITSTATUS(status), .signal = 0};
 }
 
 // What a started process reads and writes: nothing, and the file `log`.
@@ -63,6 +67,8 @@ Result<ProcessEnd> run_program(const std::string& program, const std::vector<std
   std::vector<char*> argv{name.data()};
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
+  // A program that started this one may have ignored the signal, which is inherited: then nothing is known of the end.
+  std::signal(SIGCHLD, SIG_DFL);
   pid_t process = 0;
   int failure = 0;
   {

@@ -20,7 +20,7 @@ constexpr const char* kThisProgram = "/proc/self/exe";
 
 // Runs a program, which is looked for in PATH unless its name contains a slash, with the given arguments (without its
 // name), with stdout and stderr in `log`, and waits for its end. When a stop is requested, the process receives SIGINT.
-// Error: the process cannot be started.
+// Error: the process cannot be started, or its end is not known.
 Result<ProcessEnd> run_program(const std::string& program, const std::vector<std::string>& arguments,
                                const std::filesystem::path& log, const std::stop_token& stop = {});
 

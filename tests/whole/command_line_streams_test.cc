@@ -1,4 +1,4 @@
-// The command-line program: outputs that cannot be written, and standard streams that are closed.
+// The command-line program: outputs that cannot be written, and streams and signals as another program may leave them.
 #include "whole/command_line.h"
 
 namespace bslam {
@@ -40,6 +40,27 @@ TEST_F(CommandLine, ResultsThatCannotBePrintedAreAnError) {
     EXPECT_EQ(status_of(command + " >&-" + errors), 0) << command;
     EXPECT_EQ(read_text(out("stderr")), "") << command;
   }
+}
+
+// Without a shell, which would restore the signal.
+TEST_F(CommandLine, AFailureOfAnotherProgramIsSeenAlsoIfSignalsOfChildrenAreIgnored) {
+  const std::string file = out("children.rrd"), folder = out("children"), errors = out("stderr");
+  const pid_t child = ::fork();
+  if (child == 0) {
+    std::signal(SIGCHLD, SIG_IGN);
+    ::setenv("BSLAM_PYTHON", "/bin/false", 1);
+    const bool redirected = std::freopen(errors.c_str(), "w", stderr) != nullptr;
+    if (redirected)
+      ::execl(BSLAM_PROGRAM, "bslam", "run", data().c_str(), "--out", folder.c_str(), "--rerun", file.c_str(),
+              static_cast<char*>(nullptr));
+    std::_Exit(127);
+  }
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  EXPECT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 2);
+  EXPECT_NE(read_text(errors).find("--rerun needs the Python packages"), std::string::npos) << read_text(errors);
+  EXPECT_FALSE(fs::exists(folder));
 }
 
 }  // namespace
