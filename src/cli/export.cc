@@ -107,12 +107,20 @@ Result<SE3> upright_axes_of(const Trajectory& trajectory, const TrajectoryArgume
   return selection->T_upright_world;
 }
 
-// Recorded time stamps instead of capture times: without the time offset of the camera.
-Status restore_stamps(const TrajectoryArguments& arguments, Trajectory& trajectory) {
-  if (arguments.stamps != "image") return {};
-  const auto source = rig_of_trajectory(arguments, "--stamps image");
+// Whether the times that are written are those that the images were recorded with.
+bool writes_image_stamps(const TrajectoryArguments& arguments, const evaluation::TrajectoryComments& input) {
+  return arguments.stamps == "image" || (arguments.stamps.empty() && input.image_stamps);
+}
+
+// Subtracts the time offset of the camera, or adds it, if the times of the input are not those that are written.
+Status convert_stamps(const TrajectoryArguments& arguments, Trajectory& trajectory) {
+  const auto input = evaluation::read_comments(arguments.file);
+  const bool image_stamps = writes_image_stamps(arguments, input);
+  if (image_stamps == input.image_stamps) return {};
+  const auto source = rig_of_trajectory(arguments, "--stamps " + arguments.stamps);
   if (!source) return source.error();
-  for (evaluation::TimedPose& pose : trajectory) pose.time_ns -= source->rig.camera(source->camera).time_offset_ns;
+  const TimeNs offset_ns = source->rig.camera(source->camera).time_offset_ns;
+  for (evaluation::TimedPose& pose : trajectory) pose.time_ns += image_stamps ? -offset_ns : offset_ns;
   return {};
 }
 
@@ -152,22 +160,23 @@ Result<Trajectory> converted(const TrajectoryArguments& arguments) {
   }
   trajectory = evaluation::moved_to_frame(trajectory, T_cam_frame);
   for (evaluation::TimedPose& pose : trajectory) pose.T_world_frame = T_upright_world * pose.T_world_frame;
-  if (const Status s = restore_stamps(arguments, trajectory); !s) return s.error();
+  if (const Status s = convert_stamps(arguments, trajectory); !s) return s.error();
   return trajectory;
 }
 
-// The world of the exported poses. Upright axes without a map are those of this trajectory only.
-std::string parent_frame(const TrajectoryArguments& arguments) {
-  if (arguments.axes != "ros") return "world";
-  return arguments.map ? "map" : "world_ros";
+// The world of the exported poses, which was `parent`. Upright axes without a map are those of this trajectory only.
+std::string parent_frame(const TrajectoryArguments& arguments, const std::string& parent) {
+  if (arguments.axes != "ros") return parent;
+  return arguments.map ? "map" : parent + "_ros";
 }
 
 // The comments of the exported file. If lengths are not metres in the source, they are not metres here either.
 std::string comments(const TrajectoryArguments& arguments, const std::string& frame) {
+  const auto input = evaluation::read_comments(arguments.file);
   const std::string whole_name = arguments.axes == "ros" ? frame + "_ros" : frame;
-  std::string out = evaluation::trajectory_header(whole_name, evaluation::PoseState::kFinal, parent_frame(arguments));
-  const std::string scale = evaluation::read_comments(arguments.file).scale;
-  if (scale != "metric") out += "\n# " + evaluation::scale_comment(scale);
+  std::string out = evaluation::trajectory_header(whole_name, input.state, parent_frame(arguments, input.parent));
+  if (input.scale != "metric") out += "\n# " + evaluation::scale_comment(input.scale);
+  if (writes_image_stamps(arguments, input)) out += "\n# " + evaluation::image_stamp_comment();
   return out;
 }
 
@@ -218,9 +227,9 @@ void add_export(CLI::App& app, int& exit_status) {
                    "trajectory) or world:0,-1,0.2; default: that of the camera's images");
   verb->add_option("--stamps", arguments->stamps,
                    "capture: times of capture, which include the time offset of camera 0; image: time stamps of its "
-                   "images; default: capture")
+                   "images; default: as in the trajectory")
       ->check(CLI::IsMember({"capture", "image"}));
-  verb->add_option("--rig", arguments->rig, "calibration of the run, for --frame and --stamps image");
+  verb->add_option("--rig", arguments->rig, "calibration of the run, for --frame and --stamps");
   verb->add_option("--camera", arguments->camera,
                    "number in the rig file of the camera of the trajectory; default: the one that the trajectory names")
       ->check(CLI::NonNegativeNumber);

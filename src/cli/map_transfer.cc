@@ -30,11 +30,12 @@ int map_transfer(const TransferArguments& arguments) {
   if (!merged) return report_error(merged.error());
   const auto moved = session::transfer_trajectory(*trajectory, *own, *merged);
   if (!moved) return report_error(moved.error());
-  const std::string frame = evaluation::read_comments(arguments.trajectory).frame;
+  const auto input = evaluation::read_comments(arguments.trajectory);
   const std::string parent = moved->submap == 0 ? "world" : fmt::format("world_of_submap_{}", moved->submap + 1);
-  const Status s = evaluation::write_trajectory(
-      arguments.out, moved->poses, evaluation::TrajectoryFormat::kTum,
-      evaluation::trajectory_header(frame.empty() ? "cam0" : frame, evaluation::PoseState::kFinal, parent));
+  std::string comments = evaluation::trajectory_header(input.frame.empty() ? "cam0" : input.frame, input.state, parent);
+  if (input.image_stamps) comments += "\n# " + evaluation::image_stamp_comment();
+  const Status s =
+      evaluation::write_trajectory(arguments.out, moved->poses, evaluation::TrajectoryFormat::kTum, comments);
   if (!s) return report_error(s.error());
   fmt::print("{} poses, connected by {} keyframes to submap {}\n{}\n", moved->poses.size(), moved->keyframes,
              moved->submap, arguments.out);

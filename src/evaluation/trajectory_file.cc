@@ -46,11 +46,6 @@ std::string quoted(std::string_view text) {
   return text.size() <= kShown ? fmt::format("'{}'", text) : fmt::format("'{}...'", text.substr(0, kShown));
 }
 
-Result<std::string> read_bytes(const std::filesystem::path& file) {
-  constexpr std::size_t kMaxBytes = std::size_t{1} << 32;  // 40 million poses
-  return read_text(file, kMaxBytes);
-}
-
 std::string_view trimmed(std::string_view text) {
   constexpr std::string_view kBlank = " \t\r\v\f";
   const std::size_t begin = text.find_first_not_of(kBlank);
@@ -145,7 +140,7 @@ Result<TimedPose> euroc_pose(const std::filesystem::path& file, const Line& line
   TimeNs time = 0;
   const std::string_view text = line.fields[0];
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), time);
-  if (error != std::errc() || end != text.data() + text.size() || std::abs(time) > kLargestTimeNs) {
+  if (error != std::errc() || end != text.data() + text.size() || time > kLargestTimeNs || time < -kLargestTimeNs) {
     return line_error(file, line.number, quoted(text), "a time in integer nanoseconds");
   }
   const auto v = numbers<7>(file, line, 1);
@@ -171,7 +166,7 @@ Result<SE3> kitti_pose(const std::filesystem::path& file, const Line& line) {
 
 // Reads the times that belong to KITTI poses, one per line.
 Result<std::vector<TimeNs>> read_times(const std::filesystem::path& file) {
-  const auto bytes = read_bytes(file);
+  const auto bytes = read_text(file, kMaxTrajectoryBytes);
   if (!bytes) return bytes.error();
   std::vector<TimeNs> times;
   for (const Line& line : data_lines(*bytes)) {
@@ -217,7 +212,7 @@ Result<TrajectoryFormat> detect_format(const std::filesystem::path& file, const 
 
 Result<Trajectory> kitti_trajectory(const std::filesystem::path& file, const std::vector<Line>& lines,
                                     const std::optional<std::filesystem::path>& times_option) {
-  const std::filesystem::path times_file = times_option.value_or(file.parent_path() / "times.txt");
+  const std::filesystem::path times_file = times_option.value_or(times_beside(file));
   std::error_code error;
   if (!times_option && !std::filesystem::exists(times_file, error)) {
     return Error{.file = file.string(),
@@ -258,6 +253,8 @@ std::string exact_seconds(TimeNs time_ns) {
 
 }  // namespace
 
+std::filesystem::path times_beside(const std::filesystem::path& poses) { return poses.parent_path() / "times.txt"; }
+
 std::optional<TimeNs> parse_seconds(std::string_view text) {
   const bool negative = text.starts_with('-');
   if (negative || text.starts_with('+')) text.remove_prefix(1);
@@ -294,9 +291,18 @@ std::optional<TimeNs> parse_seconds(std::string_view text) {
   return negative ? -value : value;
 }
 
+std::optional<std::filesystem::path> times_of_poses(const std::filesystem::path& file,
+                                                    const std::optional<std::filesystem::path>& times) {
+  const auto text = read_text(file, kMaxTrajectoryBytes);
+  if (!text) return std::nullopt;
+  const auto format = detect_format(file, data_lines(*text));
+  if (!format || *format != TrajectoryFormat::kKitti) return std::nullopt;
+  return times.value_or(times_beside(file));
+}
+
 Result<Trajectory> read_trajectory(const std::filesystem::path& file,
                                    const std::optional<std::filesystem::path>& times) {
-  const auto bytes = read_bytes(file);
+  const auto bytes = read_text(file, kMaxTrajectoryBytes);
   if (!bytes) return bytes.error();
   const std::vector<Line> lines = data_lines(*bytes);
   const auto format = detect_format(file, lines);
@@ -367,7 +373,7 @@ Status write_trajectory(const std::filesystem::path& file, const Trajectory& tra
     case TrajectoryFormat::kKitti:
       break;
   }
-  const std::filesystem::path times = file.parent_path() / "times.txt";
+  const std::filesystem::path times = times_beside(file);
   std::error_code error;
   if (file.filename() == times.filename())
     return Error{file.string(), "--out", "the name of the times of KITTI poses", "another name"};

@@ -26,6 +26,11 @@ enum class TrajectoryFormat { kTum, kEurocCsv, kKitti };
 Result<evaluation::Trajectory> read_trajectory(const std::filesystem::path& file,
                                                const std::optional<std::filesystem::path>& times = {});
 
+// The file with the times of a trajectory, which read_trajectory reads as well; nullopt if its format is not KITTI's,
+// or if it cannot be read.
+std::optional<std::filesystem::path> times_of_poses(const std::filesystem::path& file,
+                                                    const std::optional<std::filesystem::path>& times = {});
+
 // Converts decimal seconds ("1403636579.763555584", "1.044989e-01") to nanoseconds; digits beyond the ninth decimal are
 // rounded half away from zero. Returns nullopt if the text is not a number or is beyond +-4e9 s.
 std::optional<TimeNs> parse_seconds(std::string_view text);
@@ -36,6 +41,9 @@ std::string tum_text(const evaluation::Trajectory& trajectory, std::string_view 
 std::string euroc_csv_text(const evaluation::Trajectory& trajectory);
 std::string kitti_text(const evaluation::Trajectory& trajectory);
 std::string times_text(const evaluation::Trajectory& trajectory);
+
+// The name of the times that write_trajectory writes for KITTI poses.
+std::filesystem::path times_beside(const std::filesystem::path& poses);
 
 // Writes a trajectory atomically. KITTI then also writes times.txt into the same folder. `header` is used by TUM only.
 // Errors: a file cannot be written; times.txt exists, which may be that of a recording, unless `replace_times`;

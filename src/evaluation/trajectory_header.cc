@@ -2,32 +2,55 @@
 
 #include <fmt/format.h>
 
-#include <fstream>
+#include <algorithm>
+
+#include "base/atomic_file.h"
 
 namespace bslam::evaluation {
+namespace {
+
+constexpr std::string_view kHeader = "bslam trajectory", kImageStamps = "time stamps are those of the images";
+
+// The word after a key, such as the one after " frame="; empty if the line does not contain the key.
+std::string word_after(std::string_view line, std::string_view key) {
+  const std::size_t at = line.find(key);
+  if (at == std::string_view::npos) return {};
+  line.remove_prefix(at + key.size());
+  return std::string(line.substr(0, line.find_first_of(" :\r")));
+}
+
+void add_comment(std::string_view line, TrajectoryComments& out) {
+  if (line.starts_with(kHeader)) {
+    out.frame = word_after(line, " frame=");
+    if (const std::string parent = word_after(line, " parent="); !parent.empty()) out.parent = parent;
+    out.state = word_after(line, " final=") == "false" ? PoseState::kLive : PoseState::kFinal;
+  }
+  if (line.starts_with("scale=")) out.scale = word_after(line, "scale=");
+  if (line.starts_with(kImageStamps)) out.image_stamps = true;
+}
+
+}  // namespace
 
 std::string scale_comment(std::string_view scale) { return fmt::format("scale={}: lengths are not in metres", scale); }
 
+std::string image_stamp_comment() { return fmt::format("{}, without the time offset of camera 0", kImageStamps); }
+
 TrajectoryComments read_comments(const std::filesystem::path& file) {
   constexpr int kMaxLines = 100;
+  constexpr std::string_view kComment = "# ";
   TrajectoryComments out;
-  std::ifstream in(file);
-  std::string line;
-  const auto word_after = [&](std::string_view key) {
-    const std::size_t at = line.find(key);
-    return at == std::string::npos
-               ? std::string()
-               : line.substr(at + key.size(), line.find_first_of(" :", at + key.size()) - at - key.size());
-  };
-  for (int n = 0; n < kMaxLines && std::getline(in, line) && line.starts_with('#'); ++n) {
-    if (line.starts_with("# bslam trajectory")) out.frame = word_after(" frame=");
-    if (line.starts_with("# scale=")) out.scale = word_after("# scale=");
+  const auto bytes = read_text(file, kMaxTrajectoryBytes);
+  std::string_view text = bytes ? *bytes : std::string_view();
+  for (int n = 0; n < kMaxLines && text.starts_with('#'); ++n) {
+    const std::string_view line = text.substr(0, text.find('\n'));
+    if (line.starts_with(kComment)) add_comment(line.substr(kComment.size()), out);
+    text.remove_prefix(std::min(line.size() + 1, text.size()));
   }
   return out;
 }
 
 std::string trajectory_header(std::string_view frame, PoseState state, std::string_view parent) {
-  return fmt::format("bslam trajectory frame={} parent={} final={}", frame, parent, state == PoseState::kFinal);
+  return fmt::format("{} frame={} parent={} final={}", kHeader, frame, parent, state == PoseState::kFinal);
 }
 
 }  // namespace bslam::evaluation

@@ -1,11 +1,14 @@
 // The comments at the top of trajectory files.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <string>
 #include <string_view>
 
 namespace bslam::evaluation {
+
+constexpr std::size_t kMaxTrajectoryBytes = std::size_t{1} << 32;  // 40 million poses
 
 // kFinal: poses resolved against the final map; kLive: poses as reported during the run.
 enum class PoseState { kFinal, kLive };
@@ -17,11 +20,18 @@ std::string trajectory_header(std::string_view frame, PoseState state, std::stri
 // metres".
 std::string scale_comment(std::string_view scale);
 
+// The further comment line of trajectories whose times are those that the images were recorded with.
+std::string image_stamp_comment();
+
 // The content of the comments at the top of a trajectory file of bslam.
 struct TrajectoryComments {
   std::string frame;  // frame whose poses the file contains: cam0, body, or the name of a camera; empty if not stated
+  std::string parent = "world";
+  PoseState state = PoseState::kFinal;
   std::string scale = "metric";  // or up-to-scale, unobservable
+  bool image_stamps = false;     // whether the time offset of the camera is already subtracted from the times
 };
+// A file that cannot be read has none.
 TrajectoryComments read_comments(const std::filesystem::path& file);
 
 }  // namespace bslam::evaluation

@@ -285,7 +285,7 @@ void add_trajectories(const RunRecord& record, const std::vector<system::SubmapT
     std::string comments = trajectory_comments(record, submaps, i, state);
     if (subtracted_ns) {
       for (evaluation::TimedPose& pose : poses) pose.time_ns -= *subtracted_ns;
-      comments += "\n# time stamps are those of the images, without the time offset of camera 0";
+      comments += "\n# " + evaluation::image_stamp_comment();
     }
     files.emplace_back(trajectory_file(stem, i), evaluation::tum_text(poses, comments));
   }

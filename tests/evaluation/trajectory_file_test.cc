@@ -132,6 +132,29 @@ TEST_F(TrajectoryFile, WritesTumWithHeaderAndNineDecimals) {
   EXPECT_EQ(trajectory_header("body", PoseState::kLive), "bslam trajectory frame=body parent=world final=false");
 }
 
+TEST_F(TrajectoryFile, CommentsAreReadAsTheyAreWritten) {
+  const std::string header = "# " + trajectory_header("left", PoseState::kLive, "world_of_submap_2") + "\n# " +
+                             scale_comment("up-to-scale") + "\n# " + image_stamp_comment() + "\n";
+  std::string foreign = "\xEF\xBB\xBF" + header;  // as an editor of another system saves it
+  for (std::size_t at = 0; (at = foreign.find('\n', at)) != std::string::npos; at += 2) foreign.insert(at, 1, '\r');
+  for (const std::string& text : {header, foreign}) {
+    const TrajectoryComments comments = read_comments(write("t", text + "1.5 1 2 3 0 0 0 1\n# scale=other\n"));
+    EXPECT_EQ(comments.frame, "left");
+    EXPECT_EQ(comments.parent, "world_of_submap_2");
+    EXPECT_EQ(comments.state, PoseState::kLive);
+    EXPECT_EQ(comments.scale, "up-to-scale");
+    EXPECT_TRUE(comments.image_stamps);
+  }
+  for (const char* text : {"", "# frame=left", "# my notes: scale=3\n1.5 1 2 3 0 0 0 1\n"}) {
+    const TrajectoryComments none = read_comments(write("t", text));
+    EXPECT_EQ(none.frame, "") << text;
+    EXPECT_EQ(none.parent, "world") << text;
+    EXPECT_EQ(none.state, PoseState::kFinal) << text;
+    EXPECT_EQ(none.scale, "metric") << text;
+    EXPECT_FALSE(none.image_stamps) << text;
+  }
+}
+
 TEST_F(TrajectoryFile, ReadsTumWithCommentsTabsAndForeignLineEnds) {
   const auto read =
       read_trajectory(write("t", "\xEF\xBB\xBF# comment\r\n\r\n 1.5\t1 2 3  0 0 0 1 \r\n# x\r\n2 1 2 3 0 0 0.6 0.8"));
@@ -189,6 +212,11 @@ TEST_F(TrajectoryFile, ErrorsNameTheLine) {
   EXPECT_NE(error_of("1,2,3,4,1,0,0,0\n2.5,2,3,4,1,0,0,0\n")
                 .find("line 2: found '2.5', expected a time in integer nanoseconds"),
             std::string::npos);
+  for (const char* time : {"-9223372036854775808", "9223372036854775807", "-4000000000000000001"}) {
+    EXPECT_NE(error_of(std::string(time) + ",2,3,4,1,0,0,0\n").find("expected a time in integer nanoseconds"),
+              std::string::npos)
+        << time;
+  }
   EXPECT_NE(error_of("1,2,3,4,1,0,0,0\n2,2,,4,1,0,0,0\n").find("line 2: found '', expected a finite number"),
             std::string::npos);
 }

@@ -1,4 +1,6 @@
 // The command-line program: the files of runs, which are written completely or not at all.
+#include <tuple>
+
 #include "calibration/rig_warnings.h"
 #include "evaluation/trajectory_file.h"
 #include "rig_formats/rig_file.h"
@@ -178,6 +180,33 @@ TEST_F(CommandLine, TrajectoriesOfOtherCamerasSayWhichOne) {
   ASSERT_EQ(run("export " + truth + " --camera 1 --frame cam0" + rig_and_out).status, 0);
   const Ran moved = run("eval " + out("exported.tum") + " " + truth + " --align none --json");
   EXPECT_GT(nlohmann::json::parse(moved.out)["ate"]["max"], 1e-3) << moved.err;
+}
+
+// The stamps of the input are converted only if they are others, and its comments are kept.
+TEST_F(CommandLine, AnExportKnowsTheStampsAndTheWorldOfItsInput) {
+  const std::string rig = out("stamped.yaml"), input = out("stamped.tum"), exported = out("stamps.tum");
+  ASSERT_EQ(run("rig convert " + data() + " " + rig).status, 0);
+  std::string text = read_text(rig);
+  const std::string key = "time_offset_s: 0.0";
+  ASSERT_NE(text.find(key), std::string::npos);
+  support::write_text(rig, text.replace(text.find(key), key.size(), "time_offset_s: 0.25"));
+  const std::string header = "# bslam trajectory frame=cam0 parent=world_of_submap_2 final=false\n";
+  const std::string stamps = "# time stamps are those of the images, without the time offset of camera 0\n";
+  const std::string pose = " 1.000000000 2.000000000 3.000000000 0.000000000 0.000000000 0.000000000 1.000000000\n";
+  const std::string command = "export " + input + " --rig " + rig + " --overwrite --out " + exported;
+  for (const auto& [comments, seconds, option, written] :
+       {std::tuple(header + stamps, "5.000000000", " --stamps image", header + stamps + "5.000000000" + pose),
+        std::tuple(header + stamps, "5.000000000", "", header + stamps + "5.000000000" + pose),
+        std::tuple(header + stamps, "5.000000000", " --stamps capture", header + "5.250000000" + pose),
+        std::tuple(header, "5.250000000", " --stamps image", header + stamps + "5.000000000" + pose),
+        std::tuple(header, "5.250000000", " --stamps capture", header + "5.250000000" + pose)}) {
+    support::write_text(input, comments + seconds + pose);
+    const Ran ran = run(command + option);
+    EXPECT_EQ(ran.status, 0) << option << ": " << ran.err;
+    EXPECT_EQ(read_text(exported), written) << option;
+  }
+  EXPECT_EQ(run(command + " --axes ros").status, 0);
+  EXPECT_NE(read_text(exported).find(" frame=cam0_ros parent=world_of_submap_2_ros final=false\n"), std::string::npos);
 }
 
 TEST_F(CommandLine, AJournalReplaysItsRun) {
