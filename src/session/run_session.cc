@@ -322,7 +322,7 @@ Files output_files(const SessionResult& result, const system::Config& config) {
                    result.subtracted_ns, files);
   add_trajectories(result.record, result.live, "trajectory_live", evaluation::PoseState::kLive, result.subtracted_ns,
                    files);
-  files.emplace_back("covariance_live.csv", covariance_text(result.record));
+  files.emplace_back("covariance_live.csv", covariance_text(result.record, result.subtracted_ns.value_or(0)));
   files.emplace_back("config.yaml", yaml::config_to_yaml(table));
   if (result.refined_rig) files.emplace_back("rig_refined.yaml", rig_formats::rig_to_yaml(*result.refined_rig));
   const evaluation::Trajectory path =

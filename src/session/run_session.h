@@ -53,8 +53,8 @@ struct SessionResult {
   // cameras, with the estimate for those in use.
   std::optional<camera::Rig> refined_rig;
   execution::Journal journal;
-  // If set: subtracted from the times of all poses that are written, so that they are time stamps of images. The times
-  // of frames contain the time offset of camera 0.
+  // If set: subtracted from the times of all poses and covariances that are written, so that they are time stamps of
+  // images. The times of frames contain the time offset of camera 0.
   std::optional<TimeNs> subtracted_ns = {};
 };
 

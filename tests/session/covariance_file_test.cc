@@ -22,7 +22,8 @@ TEST(CovarianceFile, HasALineForEachPoseOfTracking) {
     record.frames.push_back(frame);
   }
   record.frames.push_back({0.4, std::nullopt});  // a dropped frame
-  std::istringstream in(covariance_text(record));
+  constexpr TimeNs kSubtracted = 1'000;
+  std::istringstream in(covariance_text(record, kSubtracted));
   std::string line;
   std::getline(in, line);
   EXPECT_EQ(line[0], '#');
@@ -31,7 +32,7 @@ TEST(CovarianceFile, HasALineForEachPoseOfTracking) {
     std::istringstream fields(line);
     std::string field;
     std::getline(fields, field, ',');
-    EXPECT_EQ(field, std::to_string(1'000'000'000 + i));
+    EXPECT_EQ(field, std::to_string(1'000'000'000 + i - kSubtracted));
     for (int row = 0; row < 6; ++row)
       for (int column = row; column < 6; ++column) {
         ASSERT_TRUE(std::getline(fields, field, ','));

@@ -338,6 +338,12 @@ TEST_F(Session, WritesTheStampsOfImagesIfRequested) {
   const evaluation::Trajectory& poses = result->trajectories.front().poses;
   ASSERT_EQ(written->size(), poses.size());
   for (std::size_t k = 0; k < poses.size(); ++k) EXPECT_EQ((*written)[k].time_ns, poses[k].time_ns - 3'000'000);
+  std::ifstream covariances(out / "covariance_live.csv");
+  std::string line;
+  std::getline(covariances, line);
+  ASSERT_TRUE(std::getline(covariances, line));
+  const TimeNs first_ns = std::stoll(line) + 3'000'000;
+  EXPECT_TRUE(std::ranges::any_of(poses, [&](const auto& pose) { return pose.time_ns == first_ns; })) << line;
 }
 
 TEST_F(Session, ContinuesTheMapOfAnEarlierRun) {
