@@ -113,7 +113,7 @@ ordered_json run_json(const RunRecord& record, const map::BundledMap& map, const
   return {{"schema", 1},
           {"summary", summary_json(record)},
           {"rig", report_rig(rig)},
-          {"submaps", report_submaps(map, paths, first_time_ns, limits, up)},
+          {"submaps", report_submaps(map, {paths, record.loops, first_time_ns, limits, up})},
           {"landmarks", map.num_landmarks()},
           {"frames", frames_json(record, limits.poses)},
           {"stages", std::move(stages)},

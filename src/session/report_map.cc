@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
 #include <vector>
 
 #include "geometry/vertical_direction.h"
+#include "session/report_loops.h"
 
 namespace bslam::session {
 namespace {
@@ -50,7 +52,7 @@ std::vector<std::size_t> add_keyframes(const map::BundledMap& map, TimeNs first_
   for (std::size_t s = 0; s < submaps.size(); ++s) {
     if (!map.alive(submaps[s].root)) continue;
     std::vector<KeyframeId> keyframes = map.keyframes_of_submap(submaps[s].root);
-    std::ranges::sort(keyframes);
+    std::ranges::sort(keyframes, {}, [&map](KeyframeId k) { return std::pair(map.keyframe(k).frame->time_ns, k); });
     for (const KeyframeId k : keyframes) {
       submap_of[k.index()] = s;
       const SE3 T_world_rig = map.keyframe(k).T_rig_world.inverse();
@@ -75,6 +77,16 @@ void add_points(const map::BundledMap& map, TimeNs first_ns, const std::vector<s
     append(landmark.position, submap.point_position);
     submap.point_time.push_back(seconds_since(map.keyframe(k).frame->time_ns, first_ns));
   }
+}
+
+// Per submap: the pairs of keyframes at the ends of its loop closures.
+std::vector<ordered_json> loops_json(std::span<const PlaceEvent> loops, const std::vector<Submap>& submaps) {
+  std::vector<std::vector<float>> times;
+  for (const Submap& submap : submaps) times.push_back(submap.keyframe_time);
+  std::vector<ordered_json> lists(submaps.size(), ordered_json::array());
+  for (const ReportLoop& loop : report_loops(loops, times))
+    lists[loop.submap].push_back(ordered_json::array({loop.at, loop.with}));
+  return lists;
 }
 
 ordered_json path_json(const evaluation::Trajectory& path, TimeNs first_ns, std::size_t limit) {
@@ -110,12 +122,12 @@ Vector3d upward(std::span<const SE3> T_world_rig, const std::optional<geometry::
 
 }  // namespace
 
-ordered_json report_submaps(const map::BundledMap& map, std::span<const system::SubmapTrajectory> paths,
-                            TimeNs first_time_ns, const ReportLimits& limits,
-                            const std::optional<geometry::UpAxis>& up) {
+ordered_json report_submaps(const map::BundledMap& map, const SubmapsRequest& request) {
+  const auto& [paths, loops, first_time_ns, limits, up] = request;
   std::vector<Submap> submaps = submaps_of(map, paths);
   const std::vector<std::size_t> submap_of = add_keyframes(map, first_time_ns, submaps);
   if (!submaps.empty()) add_points(map, first_time_ns, submap_of, limits.points, submaps);
+  const std::vector<ordered_json> loops_of = loops_json(loops, submaps);
   ordered_json list = ordered_json::array();
   for (std::size_t s = 0; s < submaps.size(); ++s) {
     const Submap& submap = submaps[s];
@@ -130,6 +142,7 @@ ordered_json report_submaps(const map::BundledMap& map, std::span<const system::
           {{"time", float_array(submap.keyframe_time)},
            {"position", float_array(submap.keyframe_position)},
            {"rotation", float_array(submap.keyframe_rotation)}}},
+         {"loops", loops_of[s]},
          {"points", {{"position", float_array(submap.point_position)}, {"time", float_array(submap.point_time)}}}});
   }
   return list;

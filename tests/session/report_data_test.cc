@@ -7,7 +7,9 @@
 
 #include "evaluation/association.h"
 #include "evaluation/trajectory_file.h"
+#include "map/synthetic_map.h"
 #include "session/report_arrays.h"
+#include "session/report_loops.h"
 #include "session/report_map.h"
 #include "session/report_truth.h"
 #include "support/data_on_disk.h"
@@ -40,6 +42,42 @@ TEST(ReportRig, LimitsTheRaysOfWideFieldsOfView) {
     ASSERT_EQ(camera["corners"].size(), 4u);
     for (const auto& ray : camera["corners"]) EXPECT_LT(std::hypot(double(ray[0]), double(ray[1])), 3.0);
   }
+}
+
+TEST(ReportLoops, JoinTheNearestKeyframesOfTheirSubmap) {
+  const std::vector<std::vector<float>> times = {{0, 1, 1, 2.5F, 4}, {}, {10, 11, 12}};
+  const std::vector<PlaceEvent> loops = {{4, 1, 80}, {12.4, 9, 50}, {11, 2.5, 60}, {1.2, 5, 40}};
+  const std::vector<ReportLoop> found = report_loops(loops, times);
+  ASSERT_EQ(found.size(), 3u);  // the ends of the third one are in different submaps
+  EXPECT_EQ(found[0].submap, 0u);
+  EXPECT_EQ(found[0].at, 4u);
+  EXPECT_EQ(found[0].with, 2u);
+  EXPECT_EQ(found[1].submap, 2u);
+  EXPECT_EQ(found[1].at, 2u);
+  EXPECT_EQ(found[1].with, 0u);
+  EXPECT_EQ(found[2].at, 2u);
+  EXPECT_EQ(found[2].with, 4u);
+  EXPECT_TRUE(report_loops(loops, {}).empty());
+}
+
+// A map to which an earlier recording was added after a later one.
+TEST(ReportSubmaps, ListKeyframesInOrderOfTimeWithTheirLoops) {
+  map::BundledMap map(map::synthetic_rig(2));
+  Random random(1, "report");
+  KeyframeId parent;
+  for (const TimeNs seconds : {5, 6, 2, 3}) {
+    frame::BundledFrame frame = *map::synthetic_frame(random, 2, 20, 5);
+    frame.time_ns = seconds * 1'000'000'000;
+    const SE3 T_rig_world(Eigen::Quaterniond::Identity(), Vector3d(double(-seconds), 0, 0));
+    parent = map.add_keyframe(std::make_shared<const frame::BundledFrame>(std::move(frame)), T_rig_world, {}, parent);
+  }
+  const std::vector<PlaceEvent> loops = {{6, 2, 90}};
+  const auto submaps = report_submaps(map, {.paths = {}, .loops = loops});
+  ASSERT_EQ(submaps.size(), 1u);
+  EXPECT_EQ(submaps[0]["keyframes"]["time"], float_array(std::vector<float>{2, 3, 5, 6}));
+  EXPECT_EQ(submaps[0]["keyframes"]["position"],
+            float_array(std::vector<float>{2, -0.0F, -0.0F, 3, -0.0F, -0.0F, 5, -0.0F, -0.0F, 6, -0.0F, -0.0F}));
+  EXPECT_EQ(submaps[0]["loops"], nlohmann::ordered_json::parse("[[3, 0]]"));
 }
 
 // A path along x, and its ground truth of the body in KITTI's or TUM's format.

@@ -60,6 +60,7 @@ export interface Submap {
   up: number[];
   path: { time: Float32Array; position: Float32Array; rotation: Float32Array };
   keyframes: { time: Float32Array; position: Float32Array; rotation: Float32Array };
+  loops: [number, number][];  // keyframes at both ends of each loop closure
   points: { position: Float32Array; time: Float32Array };
 }
 

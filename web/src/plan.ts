@@ -1,5 +1,5 @@
 // The path seen from above, with a scale in metres.
-import { lengthUnit, nearest, Run, Submap, unbrokenParts } from './data';
+import { lengthUnit, Run, Submap, unbrokenParts } from './data';
 import { h, plain, plural, roundedDown, svg } from './dom';
 
 type Point = [number, number];
@@ -76,8 +76,8 @@ function drawing(run: Run, submap: Submap, truth: Float32Array | null): SVGEleme
   });
   const keyframes = points(submap.keyframes.position);
   if (!submap.loaded) children.push(svg('g', { class: 'keyframes' }, ...keyframes.map(([cx, cy]) => svg('circle', { cx, cy, r: 1.8 }))));
-  if (keyframes.length) for (const loop of run.summary.loops) {
-    const ends = [loop.at, loop.with].map((time) => keyframes[nearest(submap.keyframes.time, time)]);
+  for (const loop of submap.loops) {
+    const ends = loop.map((k) => keyframes[k]);
     children.push(svg('path', { class: 'loop', d: pathData(ends) }), svg('circle', { class: 'loop', cx: ends[0][0], cy: ends[0][1], r: 5 }));
   }
   children.push(svg('circle', { class: 'start', cx: path[0][0], cy: path[0][1], r: 5 }),

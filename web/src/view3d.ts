@@ -310,12 +310,10 @@ export class MapView {
   }
 
   private addLoops() {
-    const { keyframes } = this.submap, lines: number[] = [], ends: number[] = [];
-    if (!keyframes.time.length) return;
-    for (const loop of this.run.summary.loops) {
-      const here = at(keyframes.position, nearest(keyframes.time, loop.at));
-      const there = at(keyframes.position, nearest(keyframes.time, loop.with));
-      lines.push(...here, ...there);
+    const { keyframes, loops } = this.submap, lines: number[] = [], ends: number[] = [];
+    for (const [newer, older] of loops) {
+      const here = at(keyframes.position, newer);
+      lines.push(...here, ...at(keyframes.position, older));
       ends.push(...here);
     }
     if (!lines.length) return;
