@@ -101,11 +101,17 @@ storage::MapFileInfo map_info(const session::RunRecord& record, const place::Voc
   return {vocabulary.id(), record.version, record.data, warning.empty() ? map_warning : warning};
 }
 
+// Whether a file that was asked for is written.
+bool is_written(const std::string& file, const session::RunRecord& record) {
+  std::error_code error;
+  return !file.empty() && !(session::interrupted_at_once(record) && std::filesystem::exists(file, error));
+}
+
 // Writes all files that can be written, in place of those of the earlier run. Returns the errors of the others.
 std::vector<Error> write_files(const session::SessionResult& result, const system::Config& config,
                                const dataset::Dataset& dataset, const SlamArguments& arguments,
                                const storage::MapFileInfo& info, session::EarlierResults& earlier) {
-  earlier.replace();
+  earlier.replace(result.record.complete);
   const auto report = arguments.no_report
                           ? std::nullopt
                           : std::optional(session::ReportSource{dataset, arguments.command, arguments.up});
@@ -113,8 +119,9 @@ std::vector<Error> write_files(const session::SessionResult& result, const syste
   const auto note = [&errors](const Status& status) {
     if (!status) errors.push_back(status.error());
   };
-  if (!arguments.journal.empty()) note(write_atomically(arguments.journal, execution::journal_text(result.journal)));
-  if (!arguments.save_map.empty()) note(storage::write_map(*result.map, info, arguments.save_map));
+  if (is_written(arguments.journal, result.record))
+    note(write_atomically(arguments.journal, execution::journal_text(result.journal)));
+  if (is_written(arguments.save_map, result.record)) note(storage::write_map(*result.map, info, arguments.save_map));
   return errors;
 }
 
@@ -164,6 +171,17 @@ void print_after(const session::RunRecord& record, const std::vector<std::string
   if (verbosity >= LogVerbosity::kWarning) print_warnings(warnings);
   print_result(record, arguments.out);
   if (arguments.memory_report) fmt::print("\n{}", session::memory_text(record));
+}
+
+// The options of the session that do not depend on the source of its frames.
+void complete_options(const SlamArguments& arguments, live_view::LiveView* view, session::RunControl& control,
+                      RunInput& input) {
+  session::SessionOptions& options = input.options;
+  options.config = input.config;
+  options.observer = view;
+  options.control = &control;
+  options.memory_report = arguments.memory_report;
+  if (arguments.count_allocations) options.allocations = begin_counting_allocations();
 }
 
 int exit_status_of(const session::SessionResult& result) {
@@ -249,15 +267,15 @@ int run_and_write(const SlamArguments& arguments, RunInput input, session::RunCo
   if (log_verbosity(arguments.log_level) >= LogVerbosity::kWarning) print_warnings(of_map);
   if (const Status s = input.before ? input.before() : Status(); !s) return report_error(s.error());
 
-  options.config = input.config;
   options.vocabulary = *vocabulary;
-  options.observer = view->get();
-  options.control = &control;
-  options.memory_report = arguments.memory_report;
-  if (arguments.count_allocations) options.allocations = begin_counting_allocations();
+  complete_options(arguments, view->get(), control, input);
   auto result = session::run_session(dataset, options);
   const std::vector<std::string> of_source = input.after ? input.after() : std::vector<std::string>();
   if (!result) return report_error(result.error());
+  if (session::interrupted_at_once(result->record) && earlier->any()) {
+    print_message("interrupted before the first frame; the earlier results in {} are kept\n", arguments.out);
+    return kExitInterrupted;
+  }
   if (arguments.image_stamps) result->subtracted_ns = dataset.rig.camera(0).time_offset_ns;
   const std::vector<std::string> warnings = note_warnings(input, of_map, of_source, result->record);
   if (arguments.memory_report) note_report_size(*result, input.config, dataset, arguments);

@@ -45,18 +45,33 @@ std::vector<fs::path> results_in(const fs::path& folder) {
 
 bool is_result_file(std::string_view name) { return std::ranges::count(kNames, name) > 0 || is_trajectory(name); }
 
+EarlierResults::EarlierResults(fs::path folder) : folder_(std::move(folder)) {
+  while (!results_in(aside(number_)).empty()) ++number_;
+}
+
+fs::path EarlierResults::aside(int number) const {
+  return folder_ / (number == 1 ? "earlier_results" : "earlier_results_" + std::to_string(number));
+}
+
+void EarlierResults::remove(int number) const {
+  std::error_code ignored;
+  for (const fs::path& name : results_in(aside(number))) fs::remove(aside(number) / name, ignored);
+  fs::remove(aside(number), ignored);  // unless there are other files
+}
+
 Result<EarlierResults> EarlierResults::move_aside(const fs::path& folder, const std::vector<fs::path>& inputs) {
   EarlierResults results(folder);
+  const fs::path aside = results.aside(results.number_);
   for (const fs::path& name : results_in(folder)) {
     std::error_code error;
     const fs::path file = folder / name;
     const auto is_file = [&](const fs::path& input) { return !input.empty() && fs::equivalent(file, input, error); };
     if (std::ranges::any_of(inputs, is_file)) continue;
-    fs::create_directory(results.aside(), error);
-    if (!error) fs::rename(file, results.aside() / name, error);
+    fs::create_directory(aside, error);
+    if (!error) fs::rename(file, aside / name, error);
     if (error) {
       const std::string reason = error.message();
-      fs::remove(results.aside(), error);  // unless files were moved there
+      fs::remove(aside, error);  // unless files were moved there
       return Error{file.string(), "--overwrite", reason, "a file of an earlier run that can be replaced"};
     }
     results.moved_.push_back(name);
@@ -67,14 +82,12 @@ Result<EarlierResults> EarlierResults::move_aside(const fs::path& folder, const 
 EarlierResults::~EarlierResults() {
   if (moved_.empty()) return;
   std::error_code ignored;
-  for (const fs::path& name : moved_) fs::rename(aside() / name, folder_ / name, ignored);
-  fs::remove(aside(), ignored);  // unless there are other files
+  for (const fs::path& name : moved_) fs::rename(aside(number_) / name, folder_ / name, ignored);
+  fs::remove(aside(number_), ignored);  // unless there are other files
 }
 
-void EarlierResults::replace() {
-  std::error_code ignored;
-  for (const fs::path& name : results_in(aside())) fs::remove(aside() / name, ignored);
-  fs::remove(aside(), ignored);  // unless there are other files
+void EarlierResults::replace(bool by_complete_run) {
+  for (int number = by_complete_run ? 1 : number_; number <= number_; ++number) remove(number);
   moved_.clear();
 }
 

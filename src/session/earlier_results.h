@@ -15,7 +15,7 @@ bool is_result_file(std::string_view name);
 
 // Keeps the results of an earlier run in FOLDER/earlier_results while a new run goes on. Without replace(), the
 // destructor moves them back. If the program is killed they stay there, so that they are neither lost nor taken for
-// results of the run that was killed.
+// results of the run that was killed; the next run then uses FOLDER/earlier_results_2, and so on.
 class EarlierResults {
  public:
   // Moves all results in `folder` aside but those that are an input of the new run. Empty names of inputs are ignored.
@@ -24,18 +24,24 @@ class EarlierResults {
                                            const std::vector<std::filesystem::path>& inputs);
 
   EarlierResults(EarlierResults&& other) noexcept
-      : folder_(std::move(other.folder_)), moved_(std::exchange(other.moved_, {})) {}
+      : folder_(std::move(other.folder_)), number_(other.number_), moved_(std::exchange(other.moved_, {})) {}
   EarlierResults& operator=(EarlierResults&&) = delete;
   ~EarlierResults();
 
-  // Removes them, and those which a run that was killed has left: the results of the new run take their place.
-  void replace();
+  // Whether there are any.
+  bool any() const { return !moved_.empty(); }
+
+  // Removes them: the results of the new run take their place. If it is complete, those which runs that were killed
+  // have left are removed as well.
+  void replace(bool by_complete_run = true);
 
  private:
-  explicit EarlierResults(std::filesystem::path folder) : folder_(std::move(folder)) {}
-  std::filesystem::path aside() const { return folder_ / "earlier_results"; }
+  explicit EarlierResults(std::filesystem::path folder);
+  std::filesystem::path aside(int number) const;
+  void remove(int number) const;
 
   std::filesystem::path folder_;
+  int number_ = 1;                            // of the first folder without results that a killed run has left
   std::vector<std::filesystem::path> moved_;  // names of files
 };
 

@@ -114,6 +114,8 @@ bool never_started(const RunRecord& record) {
          std::ranges::any_of(record.frames, had_images);
 }
 
+bool interrupted_at_once(const RunRecord& record) { return !record.complete && record.frames.empty(); }
+
 std::int64_t frames_in_loaded_map(const RunRecord& record) {
   std::int64_t frames = 0;
   for (const SubmapRecord& submap : record.submaps) frames += submap.loaded ? submap.frames : 0;

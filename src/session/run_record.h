@@ -202,6 +202,9 @@ std::vector<ContestedInterval> contested_intervals(const RunRecord& record);
 // Whether the images of several cameras could be used, but no map was started with them.
 bool never_started(const RunRecord& record);
 
+// Whether the run was interrupted before its first frame: it has no results that could replace those of an earlier one.
+bool interrupted_at_once(const RunRecord& record);
+
 // Returns the number of frames with a pose in the world frame of the loaded map.
 std::int64_t frames_in_loaded_map(const RunRecord& record);
 

@@ -68,6 +68,28 @@ TEST(EarlierResults, AreRemovedWithThoseThatAKilledRunHasLeft) {
   EXPECT_FALSE(fs::exists(folder.path() / "earlier_results"));
 }
 
+TEST(EarlierResults, OfAKilledRunAreRemovedByACompleteRunOnly) {
+  const support::TemporaryFolder folder;
+  const fs::path left = folder.path() / "earlier_results/summary.json", mine = folder.path() / "summary.json";
+  support::write_text(left, "left");
+  for (const bool replaced : {false, true}) {
+    support::write_text(mine, "interrupted");
+    auto results = EarlierResults::move_aside(folder.path(), {});
+    ASSERT_TRUE(results);
+    EXPECT_TRUE(results->any());
+    EXPECT_FALSE(fs::exists(mine));
+    EXPECT_EQ(support::read_text(left), "left");
+    if (replaced) results->replace(false);
+  }
+  EXPECT_EQ(files_below(folder.path()), (std::map<std::string, std::string>{{"earlier_results/summary.json", "left"}}));
+  EXPECT_FALSE(fs::exists(folder.path() / "earlier_results_2"));
+  auto results = EarlierResults::move_aside(folder.path(), {});
+  ASSERT_TRUE(results);
+  EXPECT_FALSE(results->any());
+  results->replace(true);
+  EXPECT_TRUE(files_below(folder.path()).empty());
+}
+
 TEST(EarlierResults, AreNeitherInputsNorFolders) {
   const support::TemporaryFolder folder;
   write_results(folder.path());
