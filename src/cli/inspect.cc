@@ -68,7 +68,8 @@ int inspect(const InspectArguments& arguments) {
   if (!masks) return report_error(masks.error());
   const auto images = dataset::read_frame(*dataset, static_cast<std::size_t>(arguments.frame));
   const auto frame = system::single_frame(dataset->rig, *config, *std::move(masks), images);
-  const Status written = write_atomically(arguments.out, to_json(frame, *dataset).dump(1) + "\n");
+  const Status written = write_atomically(
+      arguments.out, to_json(frame, *dataset).dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
   if (!written) return report_error(written.error());
   std::printf("%zu keypoints, %zu unique features = %zu monocular + %zu matched\n%s\n", frame.num_keypoints(),
               frame.bundled.size(), frame.bundled.num_monocular(), frame.bundled.num_matched(), arguments.out.c_str());

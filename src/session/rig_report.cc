@@ -142,7 +142,7 @@ std::string as_json(const Calibration& calibration, const std::optional<ImageEvi
     json["late_camera"] =
         late ? late_camera_json({{"camera", late->camera}, {"reference", late->reference}}, *late) : Json();
   }
-  return json.dump(1) + "\n";
+  return json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 
 std::string as_text(const Calibration& calibration, const std::optional<ImageEvidence>& evidence) {

@@ -55,6 +55,17 @@ TEST_F(RigReport, IsTextOrJson) {
   EXPECT_FALSE(report_rig({.file = (folder_ / "none.yaml").string()}));
 }
 
+TEST_F(RigReport, JsonOfANameThatIsNoUnicodeCanBeRead) {
+  camera::RigCamera camera{camera::stereo_rig().camera(0u), camera::stereo_rig().body_from_cam(0)};
+  camera.camera.name = "left";
+  ASSERT_TRUE(rig_formats::write_rig(camera::Rig({camera}), folder_ / "rig.yaml"));
+  std::string text = support::read_text(folder_ / "rig.yaml");
+  support::write_text(folder_ / "rig.yaml", text.replace(text.find("left"), 4, "caf\xe9"));
+  const auto json = report_rig({.file = (folder_ / "rig.yaml").string(), .json = true});
+  ASSERT_TRUE(json) << json.error().message();
+  EXPECT_EQ(nlohmann::json::parse(*json)["cameras"][0]["name"], "caf\ufffd");
+}
+
 TEST_F(RigReport, WarnsOfAnUnusableMask) {
   camera::RigCamera camera{camera::stereo_rig().camera(0u), camera::stereo_rig().body_from_cam(0)};
   camera.camera.mask_file = (folder_ / "none.png").string();
