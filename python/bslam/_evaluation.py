@@ -77,10 +77,11 @@ def evaluate(
         camera: camera of the rig whose poses are estimated; default: the one that the first line of the file `est`
             names, or 0.
         times: time stamps of KITTI poses, one per line; default: times.txt in their folder.
-        plot: SVG to write, with both paths and the error over time.
+        plot: SVG to write, with both paths and the error over time. It replaces an earlier plot, and no other file.
 
     Raises:
-        Error: a file that cannot be read, a value out of range, fewer than three poses with ground truth.
+        Error: a file that cannot be read, a value out of range, fewer than three poses with ground truth, a `plot` that
+            is an input or a file of another kind, `camera` without `rig`.
     """
     found: dict[str, Any] = _bslam.evaluate(
         _trajectory(est, "est"), _trajectory(gt, "gt"), align, max_dt, delta, gt_frame, rig, camera, times, plot

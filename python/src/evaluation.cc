@@ -10,6 +10,7 @@
 #include <optional>
 #include <string>
 #include <variant>
+#include <vector>
 
 #include "arrays.h"
 #include "base/atomic_file.h"
@@ -20,6 +21,7 @@
 #include "evaluation/trajectory_error.h"
 #include "evaluation/trajectory_file.h"
 #include "evaluation/trajectory_header.h"
+#include "report/plot_file.h"
 #include "report/trajectory_plot.h"
 #include "rig_formats/rig_file.h"
 
@@ -83,6 +85,7 @@ std::size_t camera_of_estimate(const Arguments& a, const std::string& name, cons
 std::optional<geometry::SE3> frame_of_truth(const Arguments& a, const std::string& name,
                                             const evaluation::TrajectoryComments& estimate) {
   const bool body = a.gt_frame == "body";
+  if (a.camera && !a.rig) raise({"evaluate", "camera", "no rig", "rig=FILE, which has the camera"});
   if (body && estimate.frame == "body") return std::nullopt;
   if (!a.rig) {
     if (body) raise({"evaluate", "gt_frame=body", "no rig", "rig=FILE with the pose of the camera on the body"});
@@ -148,8 +151,18 @@ nb::dict dict_of(const evaluation::TrajectoryEvaluation& e) {
   return out;
 }
 
+// The files that are read.
+std::vector<Path> files_of(const Given& est, const Given& gt, const Arguments& a) {
+  std::vector<Path> files = {a.rig.value_or(""), a.times.value_or("")};
+  for (const Given* given : {&est, &gt}) {
+    if (const Path* file = std::get_if<Path>(given)) files.push_back(*file);
+  }
+  return files;
+}
+
 nb::dict evaluate(const Given& est, const Given& gt, const Arguments& a) {
   const evaluation::EvaluationOptions options = options_of(a);
+  if (a.plot) check(report::check_plot_file(*a.plot, "evaluate", "plot", files_of(est, gt, a)));
   auto estimate = read(est, "est", a.times);
   auto truth = read(gt, "gt", a.times);
   const Path* file = std::get_if<Path>(&est);

@@ -36,6 +36,27 @@ def test_poses_of_the_body_are_compared_with_the_rig(recording, program_run, pro
     assert (tmp_path / "plot.svg").read_text().rstrip().endswith("</svg>")
 
 
+def test_a_plot_replaces_neither_its_input_nor_a_file_of_another_kind(recording, tmp_path):
+    estimate, notes = tmp_path / "estimate", tmp_path / "notes.svg"  # a name without extension passes as that of a plot
+    estimate.write_text(recording.ground_truth.read_text())
+    notes.write_text("precious")
+    for plot, found in (
+        (estimate, "found a file that this command reads"),
+        (notes, "found an existing file of another kind"),
+        (tmp_path / "plot.png", r"evaluate: plot: found .*, expected a name that ends in \.svg"),
+    ):
+        with pytest.raises(bslam.Error, match=found):
+            bslam.evaluate(estimate, recording.ground_truth, plot=plot)
+    assert estimate.read_text() == recording.ground_truth.read_text() and notes.read_text() == "precious"
+    for _ in range(2):
+        bslam.evaluate(estimate, recording.ground_truth, plot=tmp_path / "plot.svg")
+
+
+def test_a_camera_needs_a_rig(recording):
+    with pytest.raises(bslam.Error, match="camera: found no rig"):
+        bslam.evaluate(recording.ground_truth, recording.ground_truth, camera=1)
+
+
 def test_a_path_without_metres_is_compared_with_the_camera(recording, program, tmp_path):
     truth = np.loadtxt(recording.ground_truth)
     truth[:, 1:4] /= 4

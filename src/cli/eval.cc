@@ -10,12 +10,12 @@
 #include <string>
 
 #include "base/atomic_file.h"
-#include "base/output_file.h"
 #include "cli/print_message.h"
 #include "cli/trajectory_camera.h"
 #include "cli/verbs.h"
 #include "evaluation/trajectory_error.h"
 #include "evaluation/trajectory_file.h"
+#include "report/plot_file.h"
 #include "report/trajectory_plot.h"
 #include "rig_formats/rig_file.h"
 
@@ -52,16 +52,10 @@ void note_of_body(const camera::Rig& rig, const std::filesystem::path& file) {
       file.string());
 }
 
-// The plot is written as SVG, and its file name must end in .svg.
 Status check_plot(const EvalArguments& a) {
   if (!a.plot) return {};
-  const std::string extension = a.plot->extension();
-  if (!extension.empty() && extension != ".svg" && extension != ".SVG")
-    return Error{"command line", "--plot", a.plot->string(), "a name that ends in .svg, the format that is written"};
-  const Status other =
-      check_not_input(*a.plot, "--plot", {a.estimate, a.ground_truth, a.rig.value_or(""), a.times.value_or("")});
-  if (!other) return other;
-  return check_output_file(*a.plot, "--plot", true, "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<svg ");
+  return report::check_plot_file(*a.plot, "command line", "--plot",
+                                 {a.estimate, a.ground_truth, a.rig.value_or(""), a.times.value_or("")});
 }
 
 // Returns T_cam_frame of the frame of the ground truth and of the camera of the estimate; nullopt if both paths are in
@@ -208,10 +202,11 @@ void add_eval(CLI::App& app, int& exit_status) {
   verb->add_option("--gt-frame", arguments->gt_frame, "frame of the ground truth poses; body requires --rig")
       ->check(CLI::IsMember({"cam0", "body"}))
       ->capture_default_str();
-  verb->add_option("--rig", arguments->rig, "calibration with the pose of the camera on the body");
+  CLI::Option* rig = verb->add_option("--rig", arguments->rig, "calibration with the pose of the camera on the body");
   verb->add_option("--camera", arguments->camera,
                    "camera of the rig whose poses are estimated; default: the one that the trajectory names, or 0")
-      ->check(CLI::NonNegativeNumber);
+      ->check(CLI::NonNegativeNumber)
+      ->needs(rig);
   verb->add_option("--delta", arguments->delta_s, "time in seconds between the two poses of a relative error (RPE)")
       ->check(CLI::Range(1e-6, 1e6))
       ->capture_default_str();

@@ -182,9 +182,15 @@ std::string comments(const TrajectoryArguments& arguments, const std::string& fr
 
 // Neither the trajectory nor another file of the input is replaced.
 Status check_out(const TrajectoryArguments& a) {
-  const Status other =
-      check_not_input(a.out, "--out", {a.file, a.rig.value_or(""), a.map.value_or(""), a.times.value_or("")});
-  return other ? check_new_file(a.out, a.overwrite) : other;
+  const fs::path times = evaluation::times_of_poses(a.file, a.times).value_or("");
+  std::vector<std::string> outputs = {a.out};
+  if (a.format == "kitti") outputs.push_back(evaluation::times_beside(a.out));
+  for (const std::string& out : outputs) {
+    Status other =
+        check_not_input(out, "--out", {a.file, a.rig.value_or(""), a.map.value_or(""), a.times.value_or(""), times});
+    if (!other) return other;
+  }
+  return check_new_file(a.out, a.overwrite);
 }
 
 int run_export(const TrajectoryArguments& arguments) {

@@ -4,14 +4,15 @@
 
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "cli/config_arguments.h"
 #include "base/output_file.h"
+#include "cli/config_arguments.h"
 #include "cli/print_message.h"
 #include "cli/verbs.h"
 #include "cli/version.h"
@@ -114,12 +115,19 @@ Status write(const session::MergeResult& merged, const place::Vocabulary& vocabu
   return storage::write_map(merged.map, info, file);
 }
 
+// Neither a map nor another file of the input is replaced.
+Status check_out(const MergeArguments& arguments) {
+  if (arguments.dry_run) return {};
+  std::vector<std::filesystem::path> inputs(arguments.files.begin(), arguments.files.end());
+  inputs.insert(inputs.end(), {arguments.vocabulary, arguments.config.file});
+  if (Status other = check_not_input(arguments.out, "--out", inputs); !other) return other;
+  return check_output_file(arguments.out, "--out", arguments.overwrite, "BSLAMMAP");
+}
+
 int map_merge(const MergeArguments& arguments) {
   if (arguments.out.empty() && !arguments.dry_run)
     return report_error({"command line", "--out", "no file", "a file for the merged map, or --dry-run"});
-  const Status writable =
-      arguments.dry_run ? Status() : check_output_file(arguments.out, "--out", arguments.overwrite, "BSLAMMAP");
-  if (!writable) return report_error(writable.error());
+  if (const Status s = check_out(arguments); !s) return report_error(s.error());
   const auto vocabulary = storage::vocabulary_or_shipped(arguments.vocabulary);
   if (!vocabulary) return report_error(vocabulary.error());
   const auto merged = merge(arguments, *vocabulary);

@@ -63,6 +63,20 @@ int rig_info(const InfoArguments& arguments) {
   return kExitOk;
 }
 
+// No calibration is replaced by its conversion.
+Status check_converted(const std::vector<std::filesystem::path>& inputs,
+                       const std::vector<std::filesystem::path>& outputs) {
+  std::vector<std::filesystem::path> read;
+  for (const std::filesystem::path& input : inputs) {
+    const std::vector<std::filesystem::path> files = rig_formats::files_of_rig(input);
+    read.insert(read.end(), files.begin(), files.end());
+  }
+  for (const std::filesystem::path& file : outputs) {
+    if (Status other = check_not_input(file, "", read); !other) return other;
+  }
+  return {};
+}
+
 int rig_convert(const ConvertArguments& arguments) {
   const std::vector<std::filesystem::path> inputs(arguments.files.begin(), arguments.files.end() - 1);
   const std::string& out = arguments.files.back();
@@ -76,6 +90,8 @@ int rig_convert(const ConvertArguments& arguments) {
   }
   const auto rig = with_drops(std::move(in->rig), arguments.drop);
   if (!rig) return report_error(rig.error());
+  if (const Status s = check_converted(inputs, rig_formats::files_written(format, out, rig->size())); !s)
+    return report_error(s.error());
   const auto there = rig_formats::files_in_the_way(format, out);
   if (!there.empty() && !arguments.overwrite) {
     return report_error({there.front().string(), "", "an existing calibration", "a new name, or --overwrite"});

@@ -26,6 +26,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMaxRigBytes = std::size_t{1} << 22;
+constexpr const char* kSensor = "sensor.yaml";  // of a camera in EuRoC layout
 
 Result<camera::RigReading> read_euroc_file(const fs::path& file, const std::string&) {
   const std::string folder = fs::absolute(file).parent_path().filename().string();
@@ -120,22 +121,22 @@ Result<RigFile> as_file(Result<camera::RigReading> reading, RigFormat format) {
 }
 
 Result<RigFile> read_folder(const fs::path& folder) {
+  const std::vector<fs::path> files = files_of_rig(folder);
+  if (files.empty()) {
+    return Error{folder.string(), "", "a folder without a calibration",
+                 "a folder with mav0/camN/sensor.yaml, calib.txt, calib_cam_to_cam.txt, cameras.txt or rig.yaml"};
+  }
+  const fs::path name = files.front().filename();
+  if (name == "calib.txt") return as_file(read_kitti_file(files.front(), ""), RigFormat::kKitti);
+  if (name == "cameras.txt") return as_file(read_colmap_rig(folder), RigFormat::kColmap);
+  if (name != kSensor) return read_rig_file(files.front());
   camera::RigReading reading;
-  for (const fs::path& camera_folder : camera_folders(euroc_root(folder), "sensor.yaml")) {
-    auto camera = read_euroc_sensor(camera_folder / "sensor.yaml", camera_folder.filename().string());
+  for (const fs::path& file : files) {
+    auto camera = read_euroc_sensor(file, file.parent_path().filename().string());
     if (!camera) return camera.error();
     reading.cameras.push_back(*std::move(camera));
   }
-  if (!reading.cameras.empty()) return as_file(std::move(reading), RigFormat::kEuroc);
-  std::error_code error;
-  if (fs::exists(folder / "calib.txt", error)) {
-    return as_file(read_kitti_file(folder / "calib.txt", ""), RigFormat::kKitti);
-  }
-  if (fs::exists(folder / "cameras.txt", error)) return as_file(read_colmap_rig(folder), RigFormat::kColmap);
-  if (fs::exists(folder / "calib_cam_to_cam.txt", error)) return read_rig_file(folder / "calib_cam_to_cam.txt");
-  if (fs::exists(folder / "rig.yaml", error)) return read_rig_file(folder / "rig.yaml");
-  return Error{folder.string(), "", "a folder without a calibration",
-               "a folder with mav0/camN/sensor.yaml, calib.txt, calib_cam_to_cam.txt, cameras.txt or rig.yaml"};
+  return as_file(std::move(reading), RigFormat::kEuroc);
 }
 
 Status make_folder(const fs::path& folder) {
@@ -221,6 +222,19 @@ Result<RigFile> read_rig_file(const fs::path& path) {
   return Error{path.string(), "", "a file of unknown format", "one of: " + names};
 }
 
+std::vector<fs::path> files_of_rig(const fs::path& path) {
+  std::error_code error;
+  if (!fs::is_directory(path, error)) return {path};
+  std::vector<fs::path> files;
+  for (const fs::path& camera : camera_folders(euroc_root(path), kSensor)) files.push_back(camera / kSensor);
+  for (const char* name : {"calib.txt", "cameras.txt", "calib_cam_to_cam.txt", "rig.yaml"}) {
+    if (files.empty() && fs::exists(path / name, error)) files.push_back(path / name);
+  }
+  if (!files.empty() && files.front().filename() == "cameras.txt")
+    files.insert(files.end(), {path / "rigs.txt", path / "rig_config.json"});
+  return files;
+}
+
 Result<RigFile> read_joined_rigs(std::span<const fs::path> files) {
   std::vector<camera::RigCamera> cameras;
   std::vector<std::string> notes;
@@ -265,10 +279,17 @@ Result<std::vector<std::string>> write_rig_as(const camera::Rig& rig, RigFormat 
   return notes;
 }
 
+std::vector<fs::path> files_written(RigFormat format, const fs::path& out, std::size_t cameras) {
+  if (format == RigFormat::kColmap) return {out / "cameras.txt", out / "rigs.txt", out / "rig_config.json"};
+  if (format != RigFormat::kEuroc) return {out};
+  std::vector<fs::path> files;
+  for (std::size_t c = 0; c < cameras; ++c) files.push_back(out / "mav0" / fmt::format("cam{}", c) / kSensor);
+  return files;
+}
+
 std::vector<fs::path> files_in_the_way(RigFormat format, const fs::path& out) {
-  std::vector<fs::path> candidates = {out};
+  std::vector<fs::path> candidates = files_written(format, out, 0);
   if (format == RigFormat::kEuroc) candidates = {out / "mav0"};
-  if (format == RigFormat::kColmap) candidates = {out / "cameras.txt", out / "rigs.txt", out / "rig_config.json"};
   std::erase_if(candidates, [](const fs::path& path) {
     std::error_code error;
     return !fs::exists(path, error);

@@ -1,6 +1,7 @@
 // Reads and writes rig calibrations in all supported formats (docs/calibration.md).
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <optional>
 #include <span>
@@ -39,6 +40,10 @@ Result<RigFile> read_rig_file(const std::filesystem::path& path);
 // The same, without format and notes.
 Result<camera::Rig> read_rig(const std::filesystem::path& path);
 
+// The files that read_rig_file reads: `path` or, if it is a folder, those of the calibration in it. Empty if there is
+// none.
+std::vector<std::filesystem::path> files_of_rig(const std::filesystem::path& path);
+
 // Joins calibrations of parts of a rig, such as the camchains of several runs of Kalibr, by their common body frame, in
 // the order of the files. A name that is taken becomes camN, N being the index of the camera. Errors: as for
 // read_rig_file; the body frame of one of several files is its camera 0, so that the files have no common frame.
@@ -51,7 +56,10 @@ Status write_rig(const camera::Rig& rig, const std::filesystem::path& file);  //
 // (rig_formats/rig_limits.h); a file that cannot be written.
 Result<std::vector<std::string>> write_rig_as(const camera::Rig& rig, RigFormat format,
                                               const std::filesystem::path& out);
-// Returns the existing files that would be replaced.
+// The files that it writes for a rig of so many cameras.
+std::vector<std::filesystem::path> files_written(RigFormat format, const std::filesystem::path& out,
+                                                 std::size_t cameras);
+// Returns the existing files that would be replaced, of EuRoC their folder.
 std::vector<std::filesystem::path> files_in_the_way(RigFormat format, const std::filesystem::path& out);
 
 // Parts of a rig that can be omitted if a format cannot store them.

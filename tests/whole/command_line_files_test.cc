@@ -78,6 +78,31 @@ TEST_F(CommandLine, AnOutputReplacesNeitherItsInputNorAFileOfAnotherKind) {
   EXPECT_EQ(read_text(notes), "precious");
 }
 
+// The times of KITTI poses, and the calibration in a folder.
+TEST_F(CommandLine, AnOutputDoesNotReplaceAnInputThatIsNotNamed) {
+  const std::string poses = out("kitti/poses.txt"), times = out("kitti/times.txt"), rig = out("same.yaml");
+  fs::create_directory(out("kitti"));
+  const std::string truth = data() + "/groundtruth_cam0.tum", sensor = data() + "/mav0/cam0/sensor.yaml";
+  ASSERT_EQ(run("export " + truth + " --format kitti --out " + poses).status, 0);
+  fs::copy_file(data() + "/rig.yaml", rig);
+  const std::string recorded_times = read_text(times), calibration = read_text(sensor);
+  for (const std::string& arguments :
+       {"export " + poses + " --overwrite --out " + times,
+        "export " + poses + " --format kitti --overwrite --out " + out("kitti/others.txt"),
+        "export " + truth + " --rig " + times + " --format kitti --overwrite --out " + out("kitti/others.txt"),
+        "rig convert " + rig + " " + rig + " --overwrite", "rig convert " + rig + " " + rig,
+        "rig convert " + data() + " " + data() + " --overwrite",
+        "rig convert " + data() + " " + sensor + " --overwrite"}) {
+    expect_rejected(arguments);
+    EXPECT_NE(run(arguments).err.find("found a file that this command reads"), std::string::npos)
+        << arguments << ": " << run(arguments).err;
+  }
+  EXPECT_EQ(read_text(times), recorded_times);
+  EXPECT_EQ(read_text(sensor), calibration);
+  EXPECT_EQ(read_text(rig), read_text(data() + "/rig.yaml"));
+  EXPECT_EQ(run("export " + truth + " --overwrite --out " + times).status, 0);  // no input of this command
+}
+
 TEST_F(CommandLine, APlotADrawingAndAFrameReplaceAnEarlierOne) {
   const std::string truth = data() + "/groundtruth_cam0.tum";
   for (const std::string& command : {"inspect " + data() + " --frame 0 --out " + out("again.json"),
@@ -104,6 +129,9 @@ TEST_F(CommandLine, AnExportDoesNotReplaceItsMap) {
     for (int k = 0; k < 2; ++k) EXPECT_EQ(run(command + file).status, 0) << format;
   }
   expect_rejected("map merge " + map + " --overwrite --out " + out("poem.ply"));
+  const std::string onto_itself = "map merge " + map + " --overwrite --out " + map;
+  expect_rejected(onto_itself);
+  EXPECT_NE(run(onto_itself).err.find("found a file that this command reads"), std::string::npos);
   expect_rejected("map transfer " + out("exported_map/trajectory.tum") + " --from " + map + " --to " + map +
                   " --overwrite --out " + map);
   EXPECT_EQ(read_text(map), bytes);

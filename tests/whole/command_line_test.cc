@@ -40,6 +40,7 @@ TEST_F(CommandLine, SuggestsCorrectionsOfMisspelledWords) {
       {"rig info ''", "bslam: command line: FILE: found an empty value, expected a value\n"},
       {base + " --no-report --rerun r.rrd", "as well, expected one of --"},
       {"eval a b --max-dt -1", "--max-dt: found -1, expected a number from 0 to 1000000\n"},
+      {"eval a b --camera 1", "command line: --camera: found no --rig, expected --rig as well\n"},
       {"eval a b --camera -1", "--camera: found -1, expected a whole number of 0 or more\n"},
       {"run", "DATA is required (see bslam run --help)\n"}};
   for (const auto& [arguments, message] : cases) {
