@@ -33,6 +33,15 @@ std::int64_t integer(nb::handle object, const std::string& key) {
   return value;
 }
 
+// Arrays of integers have the operation that converts to an index, but it fails unless they are scalars.
+bool is_integer(nb::handle object) {
+  if (!PyIndex_Check(object.ptr())) return false;
+  if (PySequence_Check(object.ptr()) == 0) return true;
+  const bool converts = nb::steal(PyNumber_Index(object.ptr())).is_valid();
+  PyErr_Clear();
+  return converts;
+}
+
 std::string description(nb::handle object, const Pixels& array) {
   std::string out = "an array";
   const nb::object type = nb::getattr(object, "dtype", nb::none());
@@ -88,7 +97,7 @@ BorrowedImages read_images(nb::handle stamps, nb::sequence images, nb::handle ma
   BorrowedImages out;
   const std::size_t count = nb::len(images);
   std::optional<std::int64_t> common;
-  if (PyIndex_Check(stamps.ptr())) common = integer(stamps, "stamps");
+  if (is_integer(stamps)) common = integer(stamps, "stamps");
   if (!common) check_length(stamps, "stamps", count, "an integer number of nanoseconds, or a list of them");
   if (!masks.is_none()) check_length(masks, "masks", count, "a list of arrays");
   for (std::size_t i = 0; i < count; ++i) {

@@ -181,8 +181,8 @@ void bind_processing(nb::class_<PythonSystem>& system) {
           "the GIL released, so do not change them meanwhile; afterwards their memory may be used again.\n\n"
           "Args:\n"
           "    stamps: middle of each exposure in nanoseconds, or one time for all images.\n"
-          "    images: one per camera of the rig, in its order: uint8 of shape (height, width) with any row stride\n"
-          "        and contiguous pixels in a row; None where there is no image.\n"
+          "    images: one per camera of the rig, in its order: uint8 of shape (height, width) with contiguous pixels\n"
+          "        in a row. Rows may be padded, but neither overlap nor run upwards. None where there is no image.\n"
           "    masks: uint8 like the images; 0 marks pixels to ignore. None where there is no mask.\n\n"
           "Returns:\n"
           "    The result. A lost frame is a result, not an error.")

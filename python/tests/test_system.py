@@ -88,6 +88,7 @@ WRONG = [
     ([1.5, 1], None, "stamps[0]: found float 1.5, expected an integer number of nanoseconds"),
     (1.5, None, "stamps: found float, expected an integer number of nanoseconds, or a list of them"),
     ([1], None, "stamps: found 1, expected 2, one for each image"),
+    (np.array([1, 2, 3]), None, "stamps: found 3, expected 2, one for each image"),
     (1, [np.zeros((240, 376))] * 2, "images[0]: found an array of float64, shape (240, 376), expected a uint8 array of "
      "shape (h, w): 8-bit grey values"),
     (1, [np.zeros((240, 376, 3), np.uint8)] * 2, "images[0]: found an array of uint8, shape (240, 376, 3), expected a "
@@ -100,6 +101,12 @@ WRONG = [
     (1, [None], "images: found 1, expected 2, one per camera of the rig"),
     (1, [None, None], "images: found none, expected the image of at least one camera"),
 ]  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", [list, tuple, np.array, lambda s: np.int64(s[0]), lambda s: np.array(s[0])])
+def test_stamps_may_be_numbers_of_numpy(system, recording, kind):
+    stamps = [recording.stamps[0]] * 2
+    assert system.process(kind(stamps), recording.images[0]).time_ns == stamps[0]
 
 
 @pytest.mark.parametrize(("stamps", "images", "text"), WRONG)
