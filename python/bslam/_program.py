@@ -199,7 +199,8 @@ def _run(*command: Path, **options: Any) -> str:
             continue
         option = "--" + name.replace("_", "-")
         arguments.append(option if value is True else f"{option}={value}")
-    done = subprocess.run(arguments, capture_output=True, text=True, check=False)
+    # Names of files in its messages need not be UTF-8.
+    done = subprocess.run(arguments, capture_output=True, encoding="utf-8", errors="backslashreplace", check=False)
     if done.returncode != 0:
         lines = done.stderr.strip().splitlines() or [f"bslam: ended with status {done.returncode}"]
         if lines[-1].startswith("bslam: unknown command"):

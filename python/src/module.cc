@@ -3,6 +3,9 @@
 #include <nanobind/nanobind.h>
 
 #include <array>
+#include <exception>
+#include <string>
+#include <string_view>
 
 #include "bindings.h"
 #include "errors.h"
@@ -23,10 +26,27 @@ void raise(Error error) {
 
 }  // namespace bslam::python
 
+namespace {
+
+// Names of files in a message need not be UTF-8, which texts of Python are.
+void set_error(const std::exception_ptr& exception, void* type) {
+  try {
+    std::rethrow_exception(exception);
+  } catch (const bslam::python::Failure& failure) {
+    const std::string_view text = failure.what();
+    const auto message =
+        nanobind::steal(PyUnicode_DecodeUTF8(text.data(), static_cast<Py_ssize_t>(text.size()), "backslashreplace"));
+    if (message.is_valid()) PyErr_SetObject(static_cast<PyObject*>(type), message.ptr());
+  }
+}
+
+}  // namespace
+
 NB_MODULE(_bslam, module) {
   namespace nb = nanobind;
   using namespace bslam::python;
   nb::exception<Failure> error(module, "Error", PyExc_ValueError);
+  nb::register_exception_translator(set_error, error.ptr());
   error.attr("__doc__") =
       "An error in the input: a file, image, setting or call. The text is one line, the same as that of the program: "
       "the location, what was found there and what was expected.";

@@ -33,6 +33,11 @@ def test_calibrate_returns_the_rig(recording, tmp_path):
     assert "std dev" in found.text and "rig.yaml" not in found.text
 
 
+def test_errors_of_the_program_name_files_that_are_no_unicode(tmp_path):
+    with pytest.raises(bslam.Error, match=r"caf\\xe9"):
+        bslam.calibrate(os.fsdecode(os.fsencode(tmp_path) + b"/caf\xe9"))
+
+
 def test_module_is_the_program():
     done = subprocess.run([sys.executable, "-m", "bslam", "--version"], capture_output=True, text=True)
     assert done.stdout == subprocess.run([PROGRAM, "--version"], capture_output=True, text=True).stdout

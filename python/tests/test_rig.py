@@ -1,3 +1,5 @@
+import os
+
 import bslam
 import numpy as np
 import pytest
@@ -50,6 +52,12 @@ def test_mask_is_copied_into_the_rig():
     assert (rig[0].mask[:, :10] == 0).all() and (rig[0].mask[:, 10:] != 0).all()
     with pytest.raises(bslam.Error, match=r"^Camera: mask: found shape \(2, 3\), expected \(48, 64\)$"):
         camera(mask=np.zeros((2, 3), np.uint8))
+
+
+def test_errors_name_files_that_are_no_unicode(tmp_path):
+    file = os.fsencode(tmp_path) + b"/caf\xe9.yaml"
+    with pytest.raises(bslam.Error, match=r"caf\\xe9\.yaml"):
+        bslam.Rig.load(os.fsdecode(file))
 
 
 def test_errors_are_the_line_of_the_program(tmp_path, program):

@@ -157,7 +157,14 @@ def run_program(*arguments: str) -> str:
 
 def _run(*arguments: str) -> subprocess.CompletedProcess[str]:
     """Runs the program, which is killed if the worker ends."""
-    done = subprocess.run([PROGRAM, *arguments], capture_output=True, text=True, check=False, preexec_fn=_end_together)
+    done = subprocess.run(
+        [PROGRAM, *arguments],
+        capture_output=True,
+        encoding="utf-8",
+        errors="backslashreplace",  # names of files in its messages need not be UTF-8
+        check=False,
+        preexec_fn=_end_together,
+    )
     if done.returncode < 0:  # Dask tries again
         raise ProgramKilledError(f"bslam {arguments[0]} was ended by signal {-done.returncode}")
     return done
