@@ -59,8 +59,8 @@ class BSLAM_EXPORT Rig {
   // index, an index out of range.
   Result<Rig> subset(const std::vector<int>& cameras) const;
 
-  // Writes the rig file format of bslam; masks that were not loaded from files are omitted. Error: the file cannot be
-  // written.
+  // Writes the rig file format of bslam. Masks that were not loaded from files are written beside it: NAME_mask0.png
+  // beside NAME.yaml for camera 0, and so on. Error: a file cannot be written.
   Status save(const std::filesystem::path& file) const;
 
   std::size_t size() const;  // number of cameras

@@ -98,6 +98,7 @@ def simulate(
     }
     with tempfile.TemporaryDirectory() as work:
         _run("simulate", out=out, rig=_rig_file(rig, work), **options)
+        _loaded(pathlib.Path(out, "rig.yaml"), work)
     return pathlib.Path(out)
 
 
@@ -177,7 +178,7 @@ def calibrate(
         file = pathlib.Path(work, "calibrated.yaml") if out is None else out
         text = _run("rig", "calibrate", *folders, *assignments, out=file, rig=_rig_file(rig, work), **options)
         table, _, _ = text.rstrip("\n").rpartition("\n")  # the last line is the name of the file
-        return Calibration(Rig.load(file), table + "\n")
+        return Calibration(_loaded(file, work), table + "\n")
 
 
 def _rig_file(rig: Path | Rig | None, folder: str) -> Path | None:
@@ -185,6 +186,16 @@ def _rig_file(rig: Path | Rig | None, folder: str) -> Path | None:
         return rig
     rig.save(file := pathlib.Path(folder, "rig.yaml"))
     return file
+
+
+def _loaded(file: Path, work: str) -> Rig:
+    """The rig in a file that the program has written. Masks in the folder `work` of _rig_file are moved to the file."""
+    rig = Rig.load(file)
+    if not any(pathlib.Path(work).glob("rig_mask*.png")):
+        return rig
+    rig = Rig(rig.cameras)  # with masks that are in memory
+    rig.save(file)
+    return rig
 
 
 def _text(value: object) -> str:

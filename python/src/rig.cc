@@ -19,7 +19,7 @@ namespace bslam::python {
 namespace {
 
 using GivenMatrix = nb::ndarray<const double, nb::shape<4, 4>, nb::c_contig, nb::device::cpu>;
-using GivenMask = nb::ndarray<const std::uint8_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using GivenMask = nb::ndarray<nb::ro, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 
 Pose pose_of(const GivenMatrix& rows) {
   Matrix4 matrix{};
@@ -27,12 +27,16 @@ Pose pose_of(const GivenMatrix& rows) {
   return value_of(Pose::from_matrix(matrix));
 }
 
+// Masks of other types are errors: in those of floats, such as 0.5, a conversion would make zeros.
 std::vector<std::uint8_t> mask_of(const GivenMask& mask, int width, int height) {
+  if (mask.dtype() != nb::dtype<std::uint8_t>() && mask.dtype() != nb::dtype<bool>())
+    raise({"Camera", "mask", "an array of another type", "an array of uint8 or bool"});
   if (mask.shape(0) != static_cast<std::size_t>(height) || mask.shape(1) != static_cast<std::size_t>(width)) {
     raise({"Camera", "mask", "shape (" + std::to_string(mask.shape(0)) + ", " + std::to_string(mask.shape(1)) + ")",
            "(" + std::to_string(height) + ", " + std::to_string(width) + ")"});
   }
-  return {mask.data(), mask.data() + mask.size()};
+  const auto* const values = static_cast<const std::uint8_t*>(mask.data());
+  return {values, values + mask.size()};
 }
 
 std::optional<Array<std::uint8_t, -1, -1>> mask_array(const CameraCalibration& camera) {
@@ -94,7 +98,7 @@ void bind_camera(nb::module_& module) {
           "    name: unique in the rig; default: cam0, cam1, ... by index.\n"
           "    time_offset_s: true time = stamp + offset.\n"
           "    rolling_shutter_readout_s: seconds from the exposure of the first row to that of the last.\n"
-          "    mask: uint8 (height, width); 0 marks pixels to ignore in all images.")
+          "    mask: uint8 or bool (height, width); 0 marks pixels to ignore in all images.")
       .def_ro("name", &C::name, "Name, unique in the rig.")
       .def_ro("model", &C::model, "pinhole, pinhole-radtan, kannala-brandt, ucm, eucm, double-sphere or fov.")
       .def_prop_ro(
@@ -137,7 +141,8 @@ void bind_rig(nb::module_& module) {
           nb::arg("cameras"), "Returns the rig of the given cameras, in this order; the first one becomes camera 0.")
       .def(
           "save", [](const Rig& rig, const std::filesystem::path& path) { check(rig.save(path)); }, nb::arg("path"),
-          "Writes the rig file of bslam.")
+          "Writes the rig file of bslam. Masks that were not loaded from files are written beside it, as\n"
+          "NAME_mask0.png beside NAME.yaml for camera 0, and so on.")
       .def("__len__", &Rig::size)
       .def("__getitem__", camera_at, nb::arg("index"), "Returns the calibration of a camera.")
       .def_prop_ro(

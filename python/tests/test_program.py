@@ -5,6 +5,7 @@ import subprocess
 import sys
 
 import bslam
+import numpy as np
 import pytest
 from bslam._program import PROGRAM
 from conftest import RIG
@@ -36,6 +37,22 @@ def test_calibrate_returns_the_rig(recording, tmp_path):
 def test_errors_of_the_program_name_files_that_are_no_unicode(tmp_path):
     with pytest.raises(bslam.Error, match=r"caf\\xe9"):
         bslam.calibrate(os.fsdecode(os.fsencode(tmp_path) + b"/caf\xe9"))
+
+
+def test_masks_of_a_rig_in_memory_are_used_and_kept(recording, tmp_path):
+    cameras = []
+    for c in bslam.Rig.load(RIG).cameras:
+        mask = np.full(c.resolution[::-1], 255, np.uint8)
+        mask[:8] = 0
+        names = ("name", "model", "resolution", "intrinsics", "distortion", "T_body_cam")
+        cameras.append(bslam.Camera(**{name: getattr(c, name) for name in names}, mask=mask))
+    rig = bslam.Rig(cameras)
+    folder = bslam.simulate(tmp_path / "data", rig=rig, duration=0.4, rate=5)
+    np.testing.assert_array_equal(bslam.Rig.load(folder / "rig.yaml")[1].mask, rig[1].mask)
+    fast = {"features.per_image": 300}
+    found = bslam.calibrate(recording.folder, rig=rig, out=tmp_path / "rig.yaml", settings=fast)
+    for kept in (found.rig, bslam.Rig.load(tmp_path / "rig.yaml")):
+        np.testing.assert_array_equal(kept[1].mask, rig[1].mask)
 
 
 def test_module_is_the_program():

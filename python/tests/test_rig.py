@@ -54,6 +54,26 @@ def test_mask_is_copied_into_the_rig():
         camera(mask=np.zeros((2, 3), np.uint8))
 
 
+def test_masks_are_numbers_of_one_byte():
+    mask = np.ones((48, 64), bool)
+    mask[:, :10] = False
+    assert (bslam.Rig([camera(mask=mask)])[0].mask == mask).all()
+    for other in (np.full((48, 64), 0.5), mask.astype(np.int64)):
+        with pytest.raises(bslam.Error, match=r"^Camera: mask: found .*, expected an array of uint8 or bool$"):
+            camera(mask=other)
+
+
+def test_masks_are_saved_with_the_rig(tmp_path):
+    mask = np.full((48, 64), 255, np.uint8)
+    mask[:20] = 0
+    bslam.Rig([camera(), camera(mask=mask)]).save(tmp_path / "robot.yaml")
+    assert sorted(f.name for f in tmp_path.iterdir()) == ["robot.yaml", "robot_mask1.png"]
+    tmp_path.rename(moved := tmp_path.with_name("moved"))
+    again = bslam.Rig.load(moved / "robot.yaml")
+    assert again[0].mask is None
+    np.testing.assert_array_equal(again[1].mask, mask)
+
+
 def test_errors_name_files_that_are_no_unicode(tmp_path):
     file = os.fsencode(tmp_path) + b"/caf\xe9.yaml"
     with pytest.raises(bslam.Error, match=r"caf\\xe9\.yaml"):

@@ -13,6 +13,7 @@
 #include "camera/camera_description.h"
 #include "image_files/mask.h"
 #include "image_files/png_decoder.h"
+#include "image_files/png_encoder.h"
 #include "rig_formats/rig_file.h"
 
 namespace bslam {
@@ -62,6 +63,24 @@ Result<std::pair<camera::RigCamera, image::Image>> make_camera(const CameraCalib
     mask = *std::move(checked);
   }
   return std::pair(*std::move(made), std::move(mask));
+}
+
+// Writes the masks that are in memory only, and returns the rig that names them: FILE_mask0.png and so on.
+Result<camera::Rig> with_mask_files(const camera::Rig& rig, const std::vector<image::Image>& masks,
+                                    const std::filesystem::path& file) {
+  std::vector<camera::RigCamera> cameras;
+  bool written = false;
+  for (std::size_t c = 0; c < rig.size(); ++c) {
+    cameras.push_back({rig.camera(c), rig.body_from_cam(c)});
+    camera::Camera& camera = cameras.back().camera;
+    if (masks[c].empty() || !camera.mask_file.empty()) continue;
+    camera.mask_file = fmt::format("{}_mask{}.png", file.stem().string(), c);
+    const Status status =
+        write_atomically(file.parent_path() / camera.mask_file, image_files::encode_grey_png(masks[c]));
+    if (!status) return status.error();
+    written = true;
+  }
+  return written ? camera::Rig(std::move(cameras), rig.cam_from_rig(0)) : rig;
 }
 
 }  // namespace
@@ -126,7 +145,10 @@ Result<Rig> Rig::subset(const std::vector<int>& cameras) const {
 }
 
 Status Rig::save(const std::filesystem::path& file) const {
-  return api::guarded("Rig::save", [&] { return rig_formats::write_rig(impl_->rig, file); });
+  return api::guarded("Rig::save", [&]() -> Status {
+    const auto named = with_mask_files(impl_->rig, impl_->masks, file);
+    return named ? rig_formats::write_rig(*named, file) : named.error();
+  });
 }
 
 std::size_t Rig::size() const { return impl_->rig.size(); }

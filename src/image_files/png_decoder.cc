@@ -16,7 +16,6 @@
 namespace bslam::image_files {
 namespace {
 
-constexpr std::string_view kSignature = "\x89PNG\r\n\x1a\n";
 constexpr std::size_t kChunkFrame = 12;  // bytes of length, type and checksum around the data of a chunk
 
 std::uint32_t big_endian(const char* p) {
@@ -110,8 +109,8 @@ bool unfilter(int filter, const std::uint8_t* in, const std::uint8_t* above, std
 }  // namespace
 
 bool is_complete_png(std::string_view bytes) {
-  if (!bytes.starts_with(kSignature)) return false;
-  bytes.remove_prefix(kSignature.size());
+  if (!bytes.starts_with(kPngSignature)) return false;
+  bytes.remove_prefix(kPngSignature.size());
   while (const auto chunk = next_chunk(bytes)) {
     if (!checksum_holds(*chunk)) return false;
     if (chunk->type == "IEND") return true;
@@ -120,7 +119,7 @@ bool is_complete_png(std::string_view bytes) {
 }
 
 std::optional<image::Image> decode_grey_png(std::string_view bytes) {
-  bytes.remove_prefix(kSignature.size());
+  bytes.remove_prefix(kPngSignature.size());
   const auto first = next_chunk(bytes);
   const auto header = first ? read_header(*first) : std::nullopt;
   if (!header) return std::nullopt;

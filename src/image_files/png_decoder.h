@@ -8,6 +8,8 @@
 
 namespace bslam::image_files {
 
+inline constexpr std::string_view kPngSignature = "\x89PNG\r\n\x1a\n";
+
 // Returns true if the bytes are a PNG whose chunks are complete up to IEND and have correct checksums.
 bool is_complete_png(std::string_view bytes);
 

@@ -121,6 +121,24 @@ TEST(PublicRig, LoadsFilesFoldersAndMasks) {
   EXPECT_FALSE(Rig::load("/no/such/file"));
 }
 
+TEST(PublicRig, SavesItsMasks) {
+  const TemporaryFolder folder;
+  CameraCalibration masked = TexturedWall::calibration(1);
+  masked.mask.assign(static_cast<std::size_t>(masked.width) * static_cast<std::size_t>(masked.height), 255);
+  for (std::size_t i = 0; i < masked.mask.size(); i += 7) masked.mask[i] = static_cast<std::uint8_t>(i % 5);
+  const Rig rig = Rig::make({TexturedWall::calibration(0), masked}).value();
+  const auto file = folder.path() / "robot.yaml";
+  ASSERT_TRUE(rig.save(file));
+  const auto again = Rig::load(file);
+  ASSERT_TRUE(again) << again.error().message();
+  EXPECT_TRUE(again->camera(0).mask.empty());
+  EXPECT_EQ(again->camera(1).mask, masked.mask);
+  EXPECT_TRUE(std::filesystem::exists(folder.path() / "robot_mask1.png"));
+  EXPECT_FALSE(std::filesystem::exists(folder.path() / "robot_mask0.png"));
+  std::filesystem::create_directory(folder.path() / "other_mask1.png");
+  EXPECT_FALSE(rig.save(folder.path() / "other.yaml"));
+}
+
 TEST(PublicConfig, SetsByNameAndRejectsInvalidValues) {
   Config config;
   EXPECT_TRUE(config.set("features.per_image", "777"));
