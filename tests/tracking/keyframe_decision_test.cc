@@ -144,6 +144,82 @@ TEST_F(KeyframeEvidenceTest, DetectsUntrackedFeaturesWithDepth) {
   EXPECT_TRUE(e.untracked_depth);
 }
 
+// The matches of all cameras with the landmarks of a keyframe.
+FrameMatches all_matches_of(const map::BundledMap& map, KeyframeId k) {
+  const map::BundledKeyframe& keyframe = map.keyframe(k);
+  FrameMatches out(map.rig().size());
+  for (std::size_t f = 0; f < keyframe.landmarks.size(); ++f) {
+    if (!keyframe.landmarks[f].valid()) continue;
+    for (const frame::KeypointRef r : keyframe.frame->bundled.keypoints(FeatureId(f)))
+      out[r.camera.index()].push_back({r.keypoint, keyframe.landmarks[f]});
+  }
+  return out;
+}
+
+// Cameras 0 and 1 have an image in keyframe 8, the others in keyframe 4 only.
+std::vector<CameraReference> two_references() {
+  std::vector<CameraReference> out(4, {KeyframeId(8), 1, 0, 0});
+  out[2] = out[3] = {KeyframeId(4), 5, 0, 0};
+  return out;
+}
+
+TEST(KeyframeReferences, EachCameraIsComparedWithItsOwn) {
+  const map::SimulatedMap world = true_map(simulator(synthetic::default_rig()), 4.0, 0.5);
+  const map::BundledKeyframe& newest = world.map.keyframe(KeyframeId(8));
+  std::vector<CameraReference> references = two_references();
+  const auto evidence = evidence_by_reference(world.map, *newest.frame, all_matches_of(world.map, KeyframeId(8)),
+                                              newest.T_rig_world, {}, &CameraReference::best_overlap, references);
+  ASSERT_EQ(evidence.size(), 2u);
+  EXPECT_EQ(evidence[0].frames_since_keyframe, 1);
+  EXPECT_NEAR(evidence[0].parallax, 0, 1e-9);
+  EXPECT_EQ(evidence[0].overlap, evidence[0].best_overlap);
+  EXPECT_EQ(evidence[0].best_overlap, references[0].best_overlap + references[1].best_overlap);
+  EXPECT_EQ(evidence[1].frames_since_keyframe, 5);
+  EXPECT_GT(evidence[1].parallax, 0.01);
+}
+
+TEST(KeyframeReferences, TheFirstImageOfACameraMayAlreadyHaveLostMostOfThem) {
+  const map::SimulatedMap world = true_map(simulator(synthetic::default_rig()), 4.0, 0.5);
+  const map::BundledKeyframe& newest = world.map.keyframe(KeyframeId(8));
+  const FrameMatches matches = all_matches_of(world.map, KeyframeId(8));
+  const geometry::SE3 turned =
+      geometry::SE3::exp((geometry::Vector6d() << 0, 0.9, 0, 0, 0, 0).finished()) * newest.T_rig_world;
+  for (const auto& [pose, lost] : {std::pair{newest.T_rig_world, false}, std::pair{turned, true}}) {
+    std::vector<CameraReference> references(4, {KeyframeId(8), 5, 0, 0});
+    const auto evidence =
+        evidence_by_reference(world.map, *newest.frame, matches, pose, {}, &CameraReference::best_overlap, references);
+    ASSERT_EQ(evidence.size(), 1u);
+    EXPECT_EQ(evidence[0].overlap < 0.8 * evidence[0].best_overlap, lost);
+  }
+}
+
+TEST(KeyframeReferences, ACameraThatSeesNextToNothingAsksForNoKeyframe) {
+  const map::SimulatedMap world = true_map(simulator(synthetic::default_rig()), 4.0, 0.5);
+  const map::BundledKeyframe& newest = world.map.keyframe(KeyframeId(8));
+  FrameMatches matches = all_matches_of(world.map, KeyframeId(8));
+  matches[2].clear();
+  matches[3].clear();
+  std::vector<CameraReference> references = two_references();
+  EXPECT_EQ(evidence_by_reference(world.map, *newest.frame, matches, newest.T_rig_world, {},
+                                  &CameraReference::best_overlap, references)
+                .size(),
+            1u);
+}
+
+TEST(KeyframeReferences, AKeyframeIsThatOfTheCamerasInIt) {
+  const map::SimulatedMap world = true_map(simulator(synthetic::default_rig()), 4.0, 0.5);
+  frame::BundledFrame frame = *world.map.keyframe(KeyframeId(8)).frame;
+  frame.cameras[3].state = image::ImageState::kMissing;
+  std::vector<CameraReference> references;
+  refer_to(KeyframeId(5), frame, references);
+  for (const CameraReference& r : references) EXPECT_EQ(r.keyframe, KeyframeId(5));
+  references[3].best_overlap = 70;
+  refer_to(KeyframeId(8), frame, references);
+  for (std::size_t c = 0; c < 3; ++c) EXPECT_EQ(references[c].keyframe, KeyframeId(8));
+  EXPECT_EQ(references[3].keyframe, KeyframeId(5));
+  EXPECT_EQ(references[3].best_overlap, 70);
+}
+
 // Matches of camera 0 with all landmarks of a keyframe.
 FrameMatches matches_of(const map::BundledMap& map, KeyframeId k) {
   FrameMatches out(map.rig().size());

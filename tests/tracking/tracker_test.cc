@@ -93,6 +93,31 @@ TEST(Tracker, InitialisesAMetricMapAndTracksTheRig) {
   EXPECT_EQ(run.store.snapshot()->check_invariants(), std::nullopt);
 }
 
+// A front, a left and a right camera, which observe nothing in common.
+camera::Rig rig_without_overlap() {
+  const camera::Rig all = synthetic::default_rig();
+  std::vector<camera::RigCamera> cameras;
+  for (const std::size_t c : {0, 2, 3}) cameras.push_back({all.camera(c), all.body_from_cam(c)});
+  return camera::Rig(std::move(cameras));
+}
+
+// The reference frame of a monocular start after some frames, each with an image of the given camera only.
+FrameId start_reference(const std::vector<int>& cameras) {
+  TrackerRun run(rig_without_overlap());
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    std::vector<int> missing = {0, 1, 2};
+    std::erase(missing, cameras[i]);
+    run.process(run.sim.frame(FrameId(i), 0.01 * static_cast<double>(i), missing).frame);
+  }
+  return run.state.start_reference->frame->id;
+}
+
+TEST(Tracker, AStartWaitsForTheCamerasOfItsFirstFrameForOneRoundOnly) {
+  EXPECT_EQ(start_reference({0, 1, 2, 0, 1, 2, 0}), FrameId(0));  // one camera after the other
+  EXPECT_EQ(start_reference({1, 0, 0}), FrameId(0));
+  EXPECT_EQ(start_reference({1, 0, 0, 0}), FrameId(3));  // there are no images of camera 1 any more
+}
+
 TEST(Tracker, DirectTrackingPausesAfterFailures) {
   for (const auto& [front_end, expected] :
        {std::pair{FrontEnd::kFeatures, "................"}, std::pair{FrontEnd::kDirect, "xxxxxxxxxxxxxxxx"},
@@ -122,6 +147,22 @@ TEST(Tracker, AKeyframeThatIsDueIsInsertedWithFeatures) {
   const TrackOutcome outcome = run.propose(run.frame(3), {DirectFailure::kKeyframeDue});
   ASSERT_TRUE(outcome.edit);
   EXPECT_EQ(outcome.edit->kind, ProposedEdit::Kind::kKeyframe);
+}
+
+// Keyframes as often as possible, in every second frame, must not always miss the images of the same cameras.
+TEST(Tracker, CamerasWithFewerImagesHaveKeyframes) {
+  for (const int parity : {0, 1}) {
+    TrackerRun run(synthetic::default_rig());
+    int keyframes = 0, with_all = 0;
+    for (int i = 0; i < 24; ++i) {
+      const std::vector<int> missing = i > 0 && i % 2 == parity ? std::vector{2, 3} : std::vector<int>();
+      const FrameRecord record = run.process(run.sim.frame(FrameId(i), 0.12 * i, missing).frame);
+      ASSERT_EQ(record.result.status, TrackStatus::kTracking) << "frame " << i;
+      keyframes += record.keyframe;
+      with_all += record.keyframe && missing.empty();
+    }
+    EXPECT_GT(with_all, keyframes / 3) << "parity " << parity;
+  }
 }
 
 // Tracks a frame as if directly, and requests a keyframe of it, which is created and committed but not adopted.
@@ -308,6 +349,20 @@ TEST(Tracker, StartsANewSubmapIfItStaysLost) {
   EXPECT_TRUE(started.keyframe);
   EXPECT_EQ(run.store.snapshot()->roots().size(), 2u);
   EXPECT_EQ(started.root, run.store.snapshot()->roots().back());
+}
+
+// At many frames per second, the number of frames alone would mean a short disturbance.
+TEST(Tracker, StartsNoNewSubmapInAMomentAtAHighRate) {
+  constexpr int kPerSecond = 200, kLost = 20;
+  TrackerRun run(synthetic::ring_rig(2));
+  const auto frame = [&](int i) { return run.sim.frame(FrameId(i), static_cast<double>(i) / kPerSecond).frame; };
+  ASSERT_EQ(TrackerOptions().new_submap_after, kLost);
+  for (int i = 0; i < 3; ++i) run.process(frame(i));
+  run.state.track.anchored = {};
+  int lost = 0;
+  while (lost < 200 && run.process(frame(3 + lost)).result.status != TrackStatus::kTracking) ++lost;
+  EXPECT_GT(lost, 2 * kLost);
+  EXPECT_LT(lost, kPerSecond / 2);
 }
 
 // At few frames per second, the number of frames alone would mean a long time.
