@@ -127,6 +127,33 @@ void update_best(const map::BundledMap& map, std::size_t camera, int overlap, co
   best = share < min_overlap ? static_cast<int>(std::lround(overlap / std::max(share, 0.1))) : overlap;
 }
 
+// The overlap of the cameras with their common reference in a frame with features.
+void compare_together(std::span<const std::uint8_t> cameras, std::vector<CameraReference>& references,
+                      KeyframeEvidence& evidence) {
+  evidence.best_overlap = evidence.overlap;
+  for (std::size_t c = 0; c < cameras.size(); ++c) {
+    if (cameras[c]) evidence.best_overlap = std::max(evidence.best_overlap, references[c].best_overlap);
+  }
+  for (std::size_t c = 0; c < cameras.size(); ++c) {
+    if (cameras[c]) references[c].best_overlap = evidence.best_overlap;
+  }
+}
+
+// The same in a frame that was tracked directly: the sum over the cameras.
+void compare_each(const map::BundledMap& map, const FrameMatches& inliers, const geometry::SE3& T_rig_world,
+                  double min_overlap, KeyframeId reference, std::span<const std::uint8_t> cameras,
+                  std::vector<CameraReference>& references, KeyframeEvidence& evidence) {
+  const std::vector<int> overlap = overlap_by_camera(map, inliers, reference);
+  evidence.overlap = evidence.best_overlap = 0;
+  for (std::size_t c = 0; c < overlap.size(); ++c) {
+    if (!cameras[c]) continue;
+    int& best = references[c].best_direct_overlap;
+    update_best(map, c, overlap[c], T_rig_world, min_overlap, reference, best);
+    evidence.overlap += overlap[c];
+    evidence.best_overlap += best;
+  }
+}
+
 }  // namespace
 
 std::vector<int> overlap_by_camera(const map::BundledMap& map, const FrameMatches& inliers, KeyframeId reference) {
@@ -161,7 +188,7 @@ KeyframeEvidence keyframe_evidence(const map::BundledMap& map, const frame::Bund
 
 std::vector<KeyframeEvidence> evidence_by_reference(const map::BundledMap& map, const frame::BundledFrame& frame,
                                                     const FrameMatches& inliers, const geometry::SE3& T_rig_world,
-                                                    const TrackingOptions& options, int CameraReference::*best,
+                                                    const TrackingOptions& options, bool direct,
                                                     std::vector<CameraReference>& references) {
   std::map<KeyframeId, std::vector<std::uint8_t>, std::greater<>> cameras;  // by reference, the newest one first
   for (std::size_t c = 0; c < inliers.size(); ++c) {
@@ -173,15 +200,14 @@ std::vector<KeyframeEvidence> evidence_by_reference(const map::BundledMap& map, 
   std::vector<KeyframeEvidence> out;
   for (const auto& [reference, compared] : cameras) {
     KeyframeEvidence e = keyframe_evidence(map, frame, inliers, reference, T_rig_world, options, compared);
-    const std::vector<int> overlap = overlap_by_camera(map, inliers, reference);
-    e.overlap = 0;
     e.frames_since_keyframe = std::numeric_limits<int>::max();
-    for (std::size_t c = 0; c < overlap.size(); ++c) {
-      if (!compared[c]) continue;
-      update_best(map, c, overlap[c], T_rig_world, options.keyframe.min_overlap, reference, references[c].*best);
-      e.overlap += overlap[c];
-      e.best_overlap += references[c].*best;
-      e.frames_since_keyframe = std::min(e.frames_since_keyframe, references[c].frames);
+    for (std::size_t c = 0; c < compared.size(); ++c) {
+      if (compared[c]) e.frames_since_keyframe = std::min(e.frames_since_keyframe, references[c].frames);
+    }
+    if (direct) {
+      compare_each(map, inliers, T_rig_world, options.keyframe.min_overlap, reference, compared, references, e);
+    } else {
+      compare_together(compared, references, e);
     }
     // Cameras that hardly see anything, such as dark ones, would ask for a keyframe in each of their images.
     if (out.empty() || e.best_overlap >= options.consensus.min_expected) out.push_back(e);

@@ -45,11 +45,11 @@ KeyframeEvidence keyframe_evidence(const map::BundledMap& map, const frame::Bund
                                    const FrameMatches& inliers, KeyframeId reference, const geometry::SE3& T_rig_world,
                                    const TrackingOptions& options, std::span<const std::uint8_t> cameras = {});
 
-// The evidence for each reference keyframe of the cameras that have an image. `best` is the member of the references
-// that holds the maximum overlap for frames of this kind; it is updated.
+// The evidence for each reference keyframe of the cameras that have an image, the newest one first. `direct`: the frame
+// was tracked directly. The maximum overlap of the references is updated.
 std::vector<KeyframeEvidence> evidence_by_reference(const map::BundledMap& map, const frame::BundledFrame& frame,
                                                     const FrameMatches& inliers, const geometry::SE3& T_rig_world,
-                                                    const TrackingOptions& options, int CameraReference::*best,
+                                                    const TrackingOptions& options, bool direct,
                                                     std::vector<CameraReference>& references);
 
 // Makes a keyframe the reference of the cameras that have an image in `frame`, and of those without any reference.

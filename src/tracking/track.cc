@@ -290,7 +290,7 @@ TrackOutput tracked(const TrackInput& input, const Coarse& coarse, Fine&& fine, 
   TrackOutput out = output_of(input, {std::move(refined), std::move(fine.solution), std::move(fine.matches),
                                       std::move(fine.visible), fine.contest});
   update_cameras(coarse, fine, options.consensus, out);
-  out.keyframe_due = keyframe_needed(input.map, options, &CameraReference::best_overlap, out);
+  out.keyframe_due = keyframe_needed(input.map, options, false, out);
   out.state.direct = {};
   return out;
 }

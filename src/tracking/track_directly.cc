@@ -130,7 +130,7 @@ bool support_is_low(const frame::BundledFrame& frame, const FrameMatches& inlier
 
 bool needs_keyframe(const TrackInput& input, TrackingOptions options, TrackOutput& out) {
   options.keyframe.min_overlap = std::max(options.keyframe.min_overlap, options.direct.min_overlap);
-  return keyframe_needed(input.map, options, &CameraReference::best_direct_overlap, out);
+  return keyframe_needed(input.map, options, true, out);
 }
 
 bool predictable(const TrackInput& input, const frame::BundledFrame& frame) {

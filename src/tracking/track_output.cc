@@ -165,11 +165,14 @@ void update_used_camera(const frame::BundledFrame& frame, std::size_t c, const s
   for (const Match& m : inliers) camera.landmarks.push_back(m.landmark);
 }
 
-bool keyframe_needed(const map::BundledMap& map, const TrackingOptions& options, int CameraReference::*best,
-                     TrackOutput& out) {
+bool keyframe_needed(const map::BundledMap& map, const TrackingOptions& options, bool direct, TrackOutput& out) {
   TrackerState& state = out.state;
+  state.references.resize(out.frame.cameras.size());
+  for (CameraReference& r : state.references) {
+    if (!r.keyframe.valid()) r.keyframe = state.anchored.reference;
+  }
   const std::vector<KeyframeEvidence> evidence =
-      evidence_by_reference(map, out.frame, out.matches, out.result.T_rig_world, options, best, state.references);
+      evidence_by_reference(map, out.frame, out.matches, out.result.T_rig_world, options, direct, state.references);
   if (std::ranges::none_of(evidence, [&](const auto& e) { return keyframe_due(e, options.keyframe); })) return false;
   const auto new_view = [](const KeyframeEvidence& e) { return e.untracked_depth || e.camera_with_few_inliers; };
   if (std::ranges::any_of(evidence, new_view)) return true;

@@ -35,7 +35,6 @@ void update_used_camera(const frame::BundledFrame& frame, std::size_t c, const s
 // Whether the frame becomes a keyframe. `best` as in evidence_by_reference (tracking/keyframe_decision.h). If a
 // keyframe is due because the rig has moved away from a reference, but is back at a similar one, that becomes the
 // reference instead, so that the map does not grow where it is complete.
-bool keyframe_needed(const map::BundledMap& map, const TrackingOptions& options, int CameraReference::*best,
-                     TrackOutput& out);
+bool keyframe_needed(const map::BundledMap& map, const TrackingOptions& options, bool direct, TrackOutput& out);
 
 }  // namespace bslam::tracking

@@ -168,12 +168,12 @@ TEST(KeyframeReferences, EachCameraIsComparedWithItsOwn) {
   const map::BundledKeyframe& newest = world.map.keyframe(KeyframeId(8));
   std::vector<CameraReference> references = two_references();
   const auto evidence = evidence_by_reference(world.map, *newest.frame, all_matches_of(world.map, KeyframeId(8)),
-                                              newest.T_rig_world, {}, &CameraReference::best_overlap, references);
+                                              newest.T_rig_world, {}, true, references);
   ASSERT_EQ(evidence.size(), 2u);
   EXPECT_EQ(evidence[0].frames_since_keyframe, 1);
   EXPECT_NEAR(evidence[0].parallax, 0, 1e-9);
   EXPECT_EQ(evidence[0].overlap, evidence[0].best_overlap);
-  EXPECT_EQ(evidence[0].best_overlap, references[0].best_overlap + references[1].best_overlap);
+  EXPECT_EQ(evidence[0].best_overlap, references[0].best_direct_overlap + references[1].best_direct_overlap);
   EXPECT_EQ(evidence[1].frames_since_keyframe, 5);
   EXPECT_GT(evidence[1].parallax, 0.01);
 }
@@ -186,8 +186,7 @@ TEST(KeyframeReferences, TheFirstImageOfACameraMayAlreadyHaveLostMostOfThem) {
       geometry::SE3::exp((geometry::Vector6d() << 0, 0.9, 0, 0, 0, 0).finished()) * newest.T_rig_world;
   for (const auto& [pose, lost] : {std::pair{newest.T_rig_world, false}, std::pair{turned, true}}) {
     std::vector<CameraReference> references(4, {KeyframeId(8), 5, 0, 0});
-    const auto evidence =
-        evidence_by_reference(world.map, *newest.frame, matches, pose, {}, &CameraReference::best_overlap, references);
+    const auto evidence = evidence_by_reference(world.map, *newest.frame, matches, pose, {}, true, references);
     ASSERT_EQ(evidence.size(), 1u);
     EXPECT_EQ(evidence[0].overlap < 0.8 * evidence[0].best_overlap, lost);
   }
@@ -200,9 +199,7 @@ TEST(KeyframeReferences, ACameraThatSeesNextToNothingAsksForNoKeyframe) {
   matches[2].clear();
   matches[3].clear();
   std::vector<CameraReference> references = two_references();
-  EXPECT_EQ(evidence_by_reference(world.map, *newest.frame, matches, newest.T_rig_world, {},
-                                  &CameraReference::best_overlap, references)
-                .size(),
+  EXPECT_EQ(evidence_by_reference(world.map, *newest.frame, matches, newest.T_rig_world, {}, true, references).size(),
             1u);
 }
 
