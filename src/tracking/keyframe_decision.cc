@@ -115,40 +115,43 @@ double share_in_image(const map::BundledMap& map, KeyframeId keyframe, std::size
   return landmarks > 0 ? static_cast<double>(seen) / landmarks : 1.0;
 }
 
-// Updates the maximum overlap of a camera. Its first image since the keyframe may be a late one, when a part of the
-// landmarks has left the image; the maximum is then what it would have been.
-void update_best(const map::BundledMap& map, std::size_t camera, int overlap, const geometry::SE3& T_rig_world,
-                 double min_overlap, KeyframeId reference, int& best) {
-  if (best > 0 || overlap == 0) {
-    best = std::max(best, overlap);
-    return;
-  }
-  const double share = share_in_image(map, reference, camera, T_rig_world);
-  best = share < min_overlap ? static_cast<int>(std::lround(overlap / std::max(share, 0.1))) : overlap;
+// The maximum overlap of cameras with their reference, which was `best` before. If their first images since the
+// keyframe are late, a part of its landmarks has left them, and the maximum is what it would have been.
+int best_overlap(const map::BundledMap& map, KeyframeId reference, std::span<const std::size_t> late, int overlap,
+                 int best, const geometry::SE3& T_rig_world) {
+  if (best > 0 || late.empty()) return std::max(best, overlap);
+  double share = 1;
+  for (const std::size_t c : late) share = std::min(share, share_in_image(map, reference, c, T_rig_world));
+  return static_cast<int>(std::lround(overlap / std::max(share, 0.1)));
 }
 
 // The overlap of the cameras with their common reference in a frame with features.
-void compare_together(std::span<const std::uint8_t> cameras, std::vector<CameraReference>& references,
+void compare_together(const map::BundledMap& map, KeyframeId reference, std::span<const std::uint8_t> cameras,
+                      const geometry::SE3& T_rig_world, std::vector<CameraReference>& references,
                       KeyframeEvidence& evidence) {
-  evidence.best_overlap = evidence.overlap;
+  std::vector<std::size_t> late;
   for (std::size_t c = 0; c < cameras.size(); ++c) {
-    if (cameras[c]) evidence.best_overlap = std::max(evidence.best_overlap, references[c].best_overlap);
+    if (!cameras[c]) continue;
+    evidence.best_overlap = std::max(evidence.best_overlap, references[c].best_overlap);
+    if (references[c].late) late.push_back(c);
   }
+  evidence.best_overlap = best_overlap(map, reference, late, evidence.overlap, evidence.best_overlap, T_rig_world);
   for (std::size_t c = 0; c < cameras.size(); ++c) {
     if (cameras[c]) references[c].best_overlap = evidence.best_overlap;
   }
 }
 
 // The same in a frame that was tracked directly: the sum over the cameras.
-void compare_each(const map::BundledMap& map, const FrameMatches& inliers, const geometry::SE3& T_rig_world,
-                  double min_overlap, KeyframeId reference, std::span<const std::uint8_t> cameras,
+void compare_each(const map::BundledMap& map, KeyframeId reference, std::span<const std::uint8_t> cameras,
+                  const FrameMatches& inliers, const geometry::SE3& T_rig_world,
                   std::vector<CameraReference>& references, KeyframeEvidence& evidence) {
   const std::vector<int> overlap = overlap_by_camera(map, inliers, reference);
   evidence.overlap = evidence.best_overlap = 0;
   for (std::size_t c = 0; c < overlap.size(); ++c) {
     if (!cameras[c]) continue;
+    const std::span late(&c, references[c].late ? 1 : 0);
     int& best = references[c].best_direct_overlap;
-    update_best(map, c, overlap[c], T_rig_world, min_overlap, reference, best);
+    best = best_overlap(map, reference, late, overlap[c], best, T_rig_world);
     evidence.overlap += overlap[c];
     evidence.best_overlap += best;
   }
@@ -205,9 +208,9 @@ std::vector<KeyframeEvidence> evidence_by_reference(const map::BundledMap& map, 
       if (compared[c]) e.frames_since_keyframe = std::min(e.frames_since_keyframe, references[c].frames);
     }
     if (direct) {
-      compare_each(map, inliers, T_rig_world, options.keyframe.min_overlap, reference, compared, references, e);
+      compare_each(map, reference, compared, inliers, T_rig_world, references, e);
     } else {
-      compare_together(compared, references, e);
+      compare_together(map, reference, compared, T_rig_world, references, e);
     }
     // Cameras that hardly see anything, such as dark ones, would ask for a keyframe in each of their images.
     if (out.empty() || e.best_overlap >= options.consensus.min_expected) out.push_back(e);

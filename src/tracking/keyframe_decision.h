@@ -26,6 +26,7 @@ struct CameraReference {
   // features, and in frames that were tracked directly.
   int best_overlap = 0;
   int best_direct_overlap = 0;
+  bool late = false;  // the camera had no image in some frame since then
 };
 
 struct KeyframeEvidence {

@@ -148,7 +148,10 @@ TrackOutput output_of(const TrackInput& input, TrackedFrame found) {
   state.landmarks = landmarks_of(out.matches);
   count_visibility(found.visible, state.landmarks, state.visibility_counts);
   state.cameras.resize(out.matches.size());
-  for (CameraReference& r : state.references) ++r.frames;
+  for (std::size_t c = 0; c < state.references.size(); ++c) {
+    ++state.references[c].frames;
+    state.references[c].late |= frame.cameras[c].state != image::ImageState::kPresent;
+  }
   return out;
 }
 

@@ -184,11 +184,15 @@ TEST(KeyframeReferences, TheFirstImageOfACameraMayAlreadyHaveLostMostOfThem) {
   const FrameMatches matches = all_matches_of(world.map, KeyframeId(8));
   const geometry::SE3 turned =
       geometry::SE3::exp((geometry::Vector6d() << 0, 0.9, 0, 0, 0, 0).finished()) * newest.T_rig_world;
-  for (const auto& [pose, lost] : {std::pair{newest.T_rig_world, false}, std::pair{turned, true}}) {
-    std::vector<CameraReference> references(4, {KeyframeId(8), 5, 0, 0});
-    const auto evidence = evidence_by_reference(world.map, *newest.frame, matches, pose, {}, true, references);
-    ASSERT_EQ(evidence.size(), 1u);
-    EXPECT_EQ(evidence[0].overlap < 0.8 * evidence[0].best_overlap, lost);
+  const auto lost = [&](const geometry::SE3& pose, bool late, bool direct) {
+    std::vector<CameraReference> references(4, {KeyframeId(8), 5, 0, 0, late});
+    const auto e = evidence_by_reference(world.map, *newest.frame, matches, pose, {}, direct, references).at(0);
+    return e.overlap < 0.8 * e.best_overlap;
+  };
+  for (const bool direct : {true, false}) {
+    EXPECT_TRUE(lost(turned, true, direct));
+    EXPECT_FALSE(lost(newest.T_rig_world, true, direct));
+    EXPECT_FALSE(lost(turned, false, direct));
   }
 }
 
