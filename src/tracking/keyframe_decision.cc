@@ -97,6 +97,31 @@ double share_in_view(const map::BundledMap& map, KeyframeId keyframe, const fram
   return landmarks > 0 ? static_cast<double>(seen) / landmarks : 0.0;
 }
 
+// The cameras that have an image, by the keyframe that they are compared with, the newest one first. It is the newest
+// of all also for a camera that is not in it but mostly finds its landmarks: others share its view. Some keyframe must
+// have an image of the camera nevertheless, for the depth that it measures together with them.
+std::map<KeyframeId, std::vector<std::uint8_t>, std::greater<>> cameras_by_reference(
+    const map::BundledMap& map, const frame::BundledFrame& frame, const FrameMatches& inliers,
+    std::span<const CameraReference> references) {
+  constexpr double kCovered = 0.5;        // fraction of the inliers
+  constexpr std::size_t kMaxWithout = 8;  // number of keyframes without an image of a camera whose view others share
+  const KeyframeId newest = std::ranges::max(references, {}, &CameraReference::keyframe).keyframe;
+  std::vector<int> shared;
+  std::map<KeyframeId, std::vector<std::uint8_t>, std::greater<>> out;
+  for (std::size_t c = 0; c < inliers.size(); ++c) {
+    if (!present(frame, c)) continue;
+    KeyframeId reference = references[c].keyframe;
+    if (reference != newest && newest.index() - reference.index() < kMaxWithout) {
+      if (shared.empty()) shared = overlap_by_camera(map, inliers, newest);
+      if (shared[c] >= kCovered * static_cast<double>(inliers[c].size())) reference = newest;
+    }
+    auto& cameras = out[map.nearest_alive_ancestor(reference)];
+    cameras.resize(inliers.size());
+    cameras[c] = 1;
+  }
+  return out;
+}
+
 // The fraction of the landmarks that a camera observes in a keyframe and that are in its image at the pose; 1 without
 // any.
 double share_in_image(const map::BundledMap& map, KeyframeId keyframe, std::size_t camera,
@@ -193,15 +218,8 @@ std::vector<KeyframeEvidence> evidence_by_reference(const map::BundledMap& map, 
                                                     const FrameMatches& inliers, const geometry::SE3& T_rig_world,
                                                     const TrackingOptions& options, bool direct,
                                                     std::vector<CameraReference>& references) {
-  std::map<KeyframeId, std::vector<std::uint8_t>, std::greater<>> cameras;  // by reference, the newest one first
-  for (std::size_t c = 0; c < inliers.size(); ++c) {
-    if (!present(frame, c)) continue;
-    auto& of_reference = cameras[map.nearest_alive_ancestor(references[c].keyframe)];
-    of_reference.resize(inliers.size());
-    of_reference[c] = 1;
-  }
   std::vector<KeyframeEvidence> out;
-  for (const auto& [reference, compared] : cameras) {
+  for (const auto& [reference, compared] : cameras_by_reference(map, frame, inliers, references)) {
     KeyframeEvidence e = keyframe_evidence(map, frame, inliers, reference, T_rig_world, options, compared);
     e.frames_since_keyframe = std::numeric_limits<int>::max();
     for (std::size_t c = 0; c < compared.size(); ++c) {

@@ -166,9 +166,18 @@ std::vector<CameraReference> two_references() {
 TEST(KeyframeReferences, EachCameraIsComparedWithItsOwn) {
   const map::SimulatedMap world = true_map(simulator(synthetic::default_rig()), 4.0, 0.5);
   const map::BundledKeyframe& newest = world.map.keyframe(KeyframeId(8));
+  FrameMatches matches = all_matches_of(world.map, KeyframeId(8)), then = all_matches_of(world.map, KeyframeId(4));
+  for (const std::size_t c : {2, 3}) {  // landmarks that have left the view of all cameras
+    std::erase_if(then[c], [&](const Match& m) {
+      return std::ranges::count(world.map.observations(m.landmark), KeyframeId(8), &map::Observation::keyframe) > 0;
+    });
+    then[c].resize(std::min(then[c].size(), matches[c].size()));
+    for (std::size_t i = 0; i < then[c].size(); ++i) then[c][i].keypoint = matches[c][i].keypoint;
+    matches[c] = then[c];
+  }
   std::vector<CameraReference> references = two_references();
-  const auto evidence = evidence_by_reference(world.map, *newest.frame, all_matches_of(world.map, KeyframeId(8)),
-                                              newest.T_rig_world, {}, true, references);
+  const auto evidence =
+      evidence_by_reference(world.map, *newest.frame, matches, newest.T_rig_world, {}, true, references);
   ASSERT_EQ(evidence.size(), 2u);
   EXPECT_EQ(evidence[0].frames_since_keyframe, 1);
   EXPECT_NEAR(evidence[0].parallax, 0, 1e-9);
@@ -176,6 +185,21 @@ TEST(KeyframeReferences, EachCameraIsComparedWithItsOwn) {
   EXPECT_EQ(evidence[0].best_overlap, references[0].best_direct_overlap + references[1].best_direct_overlap);
   EXPECT_EQ(evidence[1].frames_since_keyframe, 5);
   EXPECT_GT(evidence[1].parallax, 0.01);
+}
+
+TEST(KeyframeReferences, ACameraWhoseViewOthersShareIsComparedWithTheNewestForSomeKeyframes) {
+  const map::SimulatedMap world = true_map(simulator(synthetic::default_rig()), 5.0, 0.5);
+  const map::BundledKeyframe& newest = world.map.keyframe(KeyframeId(10));
+  const FrameMatches matches = all_matches_of(world.map, KeyframeId(10));
+  TrackingOptions options;
+  options.consensus.min_expected = 0;
+  for (const std::size_t former : {1, 2, 3, 9}) {
+    std::vector<CameraReference> references(4, {KeyframeId(10), 1});
+    references[1] = {KeyframeId(former), 9};
+    const auto evidence =
+        evidence_by_reference(world.map, *newest.frame, matches, newest.T_rig_world, options, true, references);
+    EXPECT_EQ(evidence.size(), former <= 2 ? 2u : 1u) << "keyframe " << former;
+  }
 }
 
 TEST(KeyframeReferences, TheFirstImageOfACameraMayAlreadyHaveLostMostOfThem) {
