@@ -219,8 +219,10 @@ std::vector<KeyframeEvidence> evidence_by_reference(const map::BundledMap& map, 
                                                     const TrackingOptions& options, bool direct,
                                                     std::vector<CameraReference>& references) {
   std::vector<KeyframeEvidence> out;
-  for (const auto& [reference, compared] : cameras_by_reference(map, frame, inliers, references)) {
-    KeyframeEvidence e = keyframe_evidence(map, frame, inliers, reference, T_rig_world, options, compared);
+  const auto groups = cameras_by_reference(map, frame, inliers, references);
+  for (const auto& [reference, compared] : groups) {
+    const std::span<const std::uint8_t> some = groups.size() > 1 ? compared : std::span<const std::uint8_t>();
+    KeyframeEvidence e = keyframe_evidence(map, frame, inliers, reference, T_rig_world, options, some);
     e.frames_since_keyframe = std::numeric_limits<int>::max();
     for (std::size_t c = 0; c < compared.size(); ++c) {
       if (compared[c]) e.frames_since_keyframe = std::min(e.frames_since_keyframe, references[c].frames);

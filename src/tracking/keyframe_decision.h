@@ -22,8 +22,8 @@ inline constexpr int kFewInliersInterval = 8;
 struct CameraReference {
   KeyframeId keyframe;
   int frames = 0;  // number of frames of the rig that were tracked since then
-  // Maximum number of the keyframe's landmarks that the camera has found in a frame since then: in frames with
-  // features, and in frames that were tracked directly.
+  // Maximum number of the keyframe's landmarks found in a frame since then: by all cameras with this reference together
+  // in frames with features, and by this camera in frames that were tracked directly.
   int best_overlap = 0;
   int best_direct_overlap = 0;
   bool late = false;  // the camera had no image in some frame since then

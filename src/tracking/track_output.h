@@ -32,7 +32,7 @@ TrackOutput output_of(const TrackInput& input, TrackedFrame found);
 void update_used_camera(const frame::BundledFrame& frame, std::size_t c, const std::vector<Match>& inliers,
                         const ConsensusOptions& options, CameraConsensusState& camera);
 
-// Whether the frame becomes a keyframe. `best` as in evidence_by_reference (tracking/keyframe_decision.h). If a
+// Whether the frame becomes a keyframe. `direct` as in evidence_by_reference (tracking/keyframe_decision.h). If a
 // keyframe is due because the rig has moved away from a reference, but is back at a similar one, that becomes the
 // reference instead, so that the map does not grow where it is complete.
 bool keyframe_needed(const map::BundledMap& map, const TrackingOptions& options, bool direct, TrackOutput& out);
