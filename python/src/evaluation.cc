@@ -93,7 +93,7 @@ std::optional<geometry::SE3> frame_of_truth(const Arguments& a, const std::strin
   }
   const camera::Rig rig = value_of(rig_formats::read_rig(*a.rig));
   const std::size_t camera = camera_of_estimate(a, name, estimate.frame, rig);
-  return body ? rig.body_from_cam(camera).inverse() : rig.cam_from_rig(camera);
+  return (body ? rig.body_from_first(camera) : rig.rig_from_first(camera)).inverse();
 }
 
 evaluation::EvaluationOptions options_of(const Arguments& a) {

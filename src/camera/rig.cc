@@ -111,7 +111,8 @@ Rig Rig::with_calibration_of(const Rig& part, std::span<const int> indices) cons
     camera.camera.time_offset_ns = part.camera(i).time_offset_ns;
     camera.T_body_cam = part.body_from_cam(i);
   }
-  return Rig(std::move(cameras), cam_from_rig(0));
+  const bool same_first = !indices.empty() && indices.front() == 0;
+  return Rig(std::move(cameras), same_first ? part.cam_from_rig(0) : cam_from_rig(0));
 }
 
 bool Rig::same_intrinsics(const Rig& other) const {

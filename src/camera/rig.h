@@ -47,6 +47,10 @@ class Rig {
   // T_body_cam. The body frame is used for input and output only.
   const geometry::SE3& body_from_cam(std::size_t i) const { return calibration_->cameras[i].T_body_cam; }
   geometry::SE3 body_from_rig() const { return body_from_cam(0) * T_cam_rig_.front(); }
+  // The frame whose poses a run reports that begins with camera i: the rig frame, or that of another camera. Its pose
+  // in the rig frame and in the body.
+  geometry::SE3 rig_from_first(std::size_t i) const { return i == 0 ? geometry::SE3() : rig_from_cam(i); }
+  geometry::SE3 body_from_first(std::size_t i) const { return i == 0 ? body_from_rig() : body_from_cam(i); }
 
   // A lower bound of the cosine of the angle between the optical axis and the ray of any pixel, with a margin for the
   // motion during a rolling shutter; -1 if it is not known, since not every pixel at the border has a ray.
@@ -68,7 +72,7 @@ class Rig {
   // must be valid and distinct.
   Rig subset(std::span<const int> indices) const;
   // The inverse of `subset`: returns this rig with models, timing and extrinsics (T_body_cam) of the cameras `indices`
-  // taken from `part`.
+  // taken from `part`, and with its rig frame if both begin with the same camera.
   Rig with_calibration_of(const Rig& part, std::span<const int> indices) const;
 
   // Whether all cameras of two rigs have the same model with the same parameters, and whether they also have the same

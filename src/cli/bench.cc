@@ -42,7 +42,7 @@ Result<geometry::SE3> body_from_camera(const BenchArguments& a, const Sequence& 
   if (!request) return request.error();
   const auto dataset = dataset::open_dataset(*request);
   if (!dataset) return dataset.error();
-  return dataset->rig.body_from_cam(0);
+  return dataset->rig.body_from_rig();
 }
 
 // The result of one run, and the exit status of the benchmark that follows from it.

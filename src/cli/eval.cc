@@ -83,8 +83,8 @@ Result<std::optional<geometry::SE3>> frame_of_truth(const EvalArguments& argumen
   const auto camera = camera_of_trajectory(arguments.estimate, *rig, *arguments.rig, arguments.camera);
   if (!camera) return camera.error();
   if (arguments.gt_frame == "body") note_of_body(*rig, *arguments.rig);
-  return std::optional(arguments.gt_frame == "body" ? rig->body_from_cam(*camera).inverse()
-                                                    : rig->cam_from_rig(*camera));
+  return std::optional(arguments.gt_frame == "body" ? rig->body_from_first(*camera).inverse()
+                                                    : rig->rig_from_first(*camera).inverse());
 }
 
 void move_to_one_frame(const geometry::SE3& T_cam_frame, const EvalArguments& arguments, Trajectory& estimate,

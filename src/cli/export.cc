@@ -62,9 +62,9 @@ Result<SE3> frame_in_camera(const std::string& name, const TrajectoryArguments& 
   const auto source = rig_of_trajectory(arguments, "--frame " + name);
   if (!source) return source.error();
   const auto& [rig, camera] = *source;
-  if (name == "body") return rig.body_from_cam(camera).inverse();
+  if (name == "body") return rig.body_from_first(camera).inverse();
   if (const auto target = name == "cam0" ? std::size_t{0} : camera::camera_named(name, rig))
-    return rig.cam_from_rig(camera) * rig.rig_from_cam(*target);
+    return rig.rig_from_first(camera).inverse() * rig.rig_from_first(*target);
   std::string names = "body, cam0";
   for (std::size_t c = 0; c < rig.size(); ++c) {
     if (rig.camera(c).name != "cam0") names += ", " + rig.camera(c).name;
@@ -77,7 +77,7 @@ Result<SE3> camera_on_body(const geometry::UpAxis& up, const TrajectoryArguments
   if (up.frame != geometry::UpAxis::Frame::kBody) return SE3();
   const auto source = rig_of_trajectory(arguments, "--up " + arguments.up);
   if (!source) return source.error();
-  return source->rig.body_from_cam(source->camera);
+  return source->rig.body_from_first(source->camera);
 }
 
 // The rotation of the world's axes: that of the map if one is given, so that the path fits maps exported for ROS.

@@ -22,7 +22,7 @@ ordered_json statistics_json(const evaluation::ErrorStatistics& s) {
 // T_truth_cam0 of the run's camera 0; nullopt if it is not known. groundtruth_cam0.tum contains poses of the first
 // camera of the rig, all other files poses of the body, which is image_0 in the calibration of KITTI.
 std::optional<geometry::SE3> camera_in_truth_frame(const dataset::Dataset& dataset) {
-  if (dataset.ground_truth->filename() != "groundtruth_cam0.tum") return dataset.rig.body_from_cam(0);
+  if (dataset.ground_truth->filename() != "groundtruth_cam0.tum") return dataset.rig.body_from_rig();
   const auto used = static_cast<std::size_t>(dataset.cameras_used.front());
   if (used == 0) return geometry::SE3();
   if (!dataset.whole_rig) return std::nullopt;

@@ -108,6 +108,21 @@ TEST(Rig, ReplacesTheExtrinsicsOfSomeCameras) {
   EXPECT_LT(difference(found.body_from_cam(2), rig.body_from_cam(2)), 1e-15);
 }
 
+TEST(Rig, KeepsTheTurnOfARefinedFirstCamera) {
+  const Rig rig = three_cameras();
+  const SE3 turn = rotated(0.01, Vector3d::Zero());
+  const Rig part({{rig.camera(std::size_t{0}), rig.body_from_cam(0) * turn.inverse()},
+                  {rig.camera(std::size_t{1}), rig.body_from_cam(1)}},
+                 turn);
+  const std::array order = {0, 1};
+  const Rig found = rig.with_calibration_of(part, order);
+  EXPECT_LT(difference(found.cam_from_rig(0), turn), 1e-15);
+  EXPECT_LT(difference(found.body_from_rig(), rig.body_from_rig()), 1e-15);
+  // The poses of a run that begins with camera 0 are those of the frame that has not turned.
+  EXPECT_LT(difference(found.body_from_first(0), rig.body_from_cam(0)), 1e-15);
+  EXPECT_LT(difference(found.rig_from_first(2), rig.rig_from_cam(2)), 1e-15);
+}
+
 TEST(Rig, ReplacesTheTimingOfSomeCameras) {
   const Rig rig = three_cameras();
   Camera late = rig.camera(std::size_t{2});
