@@ -16,6 +16,9 @@ namespace {
 // Maximum number of keyframes of a map without metric scale that is discarded if tracking is lost, and of a map that is
 // discarded if the cameras that determine its scale contradict it, or its poses are undecided.
 constexpr std::size_t kMaxFailedMap = 4, kMaxContradictedMap = 8;
+// Maximum age of such a map, in seconds. A rig that hardly moves adds few keyframes, but a map that has agreed with the
+// images for longer is right.
+constexpr double kMaxFailedAge_s = 3.0;
 // After this number of such maps the contradicting cameras are assumed to be wrong instead, and undecided poses to be
 // right.
 constexpr int kMaxContradictions = 3;
@@ -107,6 +110,7 @@ void System::discard_map() {
     record.keyframe = false;
   }
   early_.clear();
+  map_started_ns_.reset();
   pipeline_.restart();
   executor_->restart();
   {
@@ -147,6 +151,8 @@ Result<FrameRecord> System::process(const image::ImageBundle& images) {
   }
   const bool disowned = had_pose && map_disowned(outcome);
   const bool contradicted = had_pose && !disowned && map_contradicted(outcome);
+  if (outcome.record.result.status == tracking::TrackStatus::kTracking && !map_started_ns_)
+    map_started_ns_ = outcome.record.result.time_ns;
   frames_.push_back(std::move(outcome.record));
   mark_created_keyframes();
   contradictions_ += contradicted;
@@ -218,21 +224,23 @@ bool System::undecided(const tracking::TrackResult& result) const {
   return frames >= tracking::kContestedFrames;
 }
 
-std::size_t System::keyframes_of_new_map(const Pipeline::Outcome& outcome) const {
-  return outcome.seen->keyframe_slots() - first_of_map_.index();
+// Returns true if the map consists of at most this number of keyframes and was started recently.
+bool System::map_is_new(const Pipeline::Outcome& outcome, std::size_t max_keyframes) const {
+  if (loaded_ || !map_started_ns_) return false;
+  const double age_s = to_seconds(outcome.record.result.time_ns - *map_started_ns_);
+  return age_s <= kMaxFailedAge_s && outcome.seen->keyframe_slots() - first_of_map_.index() <= max_keyframes;
 }
 
 // Returns true if a recent monocular initialisation was wrong: the frames after it are lost.
 bool System::map_disowned(const Pipeline::Outcome& outcome) const {
-  return !loaded_ && outcome.seen->scale() != map::Scale::kMetric && disowns_map(outcome.record.result) &&
-         keyframes_of_new_map(outcome) <= kMaxFailedMap;
+  return outcome.seen->scale() != map::Scale::kMetric && disowns_map(outcome.record.result) &&
+         map_is_new(outcome, kMaxFailedMap);
 }
 
 // Returns true if a recent initialisation was wrong, because most of its points were on a moving object: the cameras
 // that determine the scale contradict it, or the landmarks support two motions.
 bool System::map_contradicted(const Pipeline::Outcome& outcome) const {
-  if (loaded_ || contradictions_ >= kMaxContradictions || keyframes_of_new_map(outcome) > kMaxContradictedMap)
-    return false;
+  if (contradictions_ >= kMaxContradictions || !map_is_new(outcome, kMaxContradictedMap)) return false;
   const bool metric = outcome.seen->scale() == map::Scale::kMetric;
   return (metric && scale_contradicted(outcome.record.result)) || undecided(outcome.record.result);
 }

@@ -127,7 +127,7 @@ class System {
  private:
   bool scale_contradicted(const tracking::TrackResult& result) const;
   bool undecided(const tracking::TrackResult& result) const;
-  std::size_t keyframes_of_new_map(const Pipeline::Outcome& outcome) const;
+  bool map_is_new(const Pipeline::Outcome& outcome, std::size_t max_keyframes) const;
   bool map_disowned(const Pipeline::Outcome& outcome) const;
   bool map_contradicted(const Pipeline::Outcome& outcome) const;
   void discard_map();
@@ -147,6 +147,7 @@ class System {
   const bool loaded_;                                  // whether the run began with a loaded map
   const KeyframeId first_keyframe_;                    // first keyframe of this run
   KeyframeId first_of_map_;                            // first keyframe after the last discarded map
+  std::optional<TimeNs> map_started_ns_;               // time of the first pose after the last discarded map
   int contradictions_ = 0;                             // number of maps discarded because they were contradicted
   const std::shared_ptr<looping::LoopCloser> closer_;  // null: no loops are closed
   KeyframeMaker keyframe_maker_;

@@ -260,6 +260,27 @@ TEST(SystemSequential, DiscardsANewMapUpToScaleAndItsPosesIfLost) {
   EXPECT_LT(ate_m(final_poses(system), tour.replayed_truth(k), evaluation::AlignMode::kSim3), 0.01);
 }
 
+// A rig that stands still adds no keyframes, so that its map stays small.
+TEST(SystemSequential, KeepsASmallMapUpToScaleThatAgreedForSeconds) {
+  const RenderedTour tour(1, 16);
+  System system(tour.rig(), small_config(execution::Mode::kSequential));
+  std::size_t k = 0;
+  while (k < 8 && tracked_frames(system) == 0) must_process(system, tour.frames()[k++]);
+  const std::size_t here = k - 1, rest = static_cast<std::size_t>(4 * RenderedTour::kRateHz);
+  for (std::size_t end = k + rest; k < end; ++k) must_process(system, tour.replayed(here, k - here));
+  const std::size_t before = tracked_frames(system);
+  ASSERT_GT(before, rest);
+  ASSERT_LE(system.snapshot()->num_keyframes(), 4u);
+  image::ImageBundle elsewhere = tour.replayed(here, k++ - here);
+  mirror(elsewhere.images[0]);
+  const FrameRecord lost = must_process(system, elsewhere);
+  EXPECT_EQ(lost.result.status, TrackStatus::kLost);
+  EXPECT_FALSE(lost.map_withdrawn);
+  EXPECT_EQ(must_process(system, tour.replayed(here, k++ - here)).result.status, TrackStatus::kTracking);
+  EXPECT_EQ(tracked_frames(system), before + 1);
+  EXPECT_EQ(system.maps_started(), 1);
+}
+
 TEST(SystemSequential, KeepsANewMapDuringADarkFrame) {
   const RenderedTour tour(1, 16);
   System system(tour.rig(), small_config(execution::Mode::kSequential));
