@@ -122,10 +122,12 @@ std::optional<LoopClosure> LoopCloser::close(KeyframeId keyframe, map::MapDraft&
     return std::nullopt;
   }
   const auto& [place_match, closure] = *found;
+  if (closure.merged) {
+    merge_submaps(closure, place_match, options_.loop, features_, draft);
+    return closure;
+  }
   map::MapDraft attempt = draft;
-  const bool done = closure.merged ? merge_submaps(closure, place_match, options_.loop, features_, attempt)
-                                   : close_loop(closure, place_match, options_.loop, features_, attempt);
-  if (!done) return std::nullopt;
+  if (!close_loop(closure, place_match, options_.loop, features_, attempt)) return std::nullopt;
   draft = std::move(attempt);
   return closure;
 }

@@ -75,6 +75,13 @@ std::vector<KeyframeId> window_of(const map::BundledMap& map, KeyframeId keyfram
   return window;
 }
 
+// Whether a keyframe was created closer in time to the matched keyframe than to the current one. Tracking may have
+// joined both ends of the loop already, so that keyframes of the place are among the neighbours of the current one.
+bool at_place(KeyframeId k, const LoopClosure& closure) {
+  const auto distance = [&](KeyframeId other) { return std::abs(k.value() - other.value()); };
+  return distance(closure.matched_keyframe) < distance(closure.keyframe);
+}
+
 // Fuses the window with the place. The keyframe's landmarks are merged with the landmarks it was matched to; then the
 // landmarks of the place are projected into all keyframes of the window at the given poses.
 void fuse(const std::vector<KeyframeId>& window, const std::vector<SE3>& T_rig_world, const LoopClosure& closure,
@@ -201,7 +208,7 @@ LoopClosure measure(const map::BundledMap& map, KeyframeId keyframe, const Place
 }
 
 bool plausible(const map::BundledMap& map, const LoopClosure& closure, const LoopOptions& options) {
-  if (closure.merged) return map.scale() == map::Scale::kMetric;
+  if (closure.merged) return true;
   const auto [first, last] = std::minmax(closure.keyframe, closure.matched_keyframe);
   const double share = map.scale() == map::Scale::kMetric ? options.max_drift : options.max_drift_free;
   const double way = path_length(map, first, last) + map::median_depth(map, closure.keyframe);
@@ -209,14 +216,16 @@ bool plausible(const map::BundledMap& map, const LoopClosure& closure, const Loo
          closure.translation_correction <= share * way && closure.rotation_correction <= kMaxRotation;
 }
 
-bool merge_submaps(const LoopClosure& closure, const PlaceMatch& place_match, const LoopOptions& options,
+void merge_submaps(const LoopClosure& closure, const PlaceMatch& place_match, const LoopOptions& options,
                    const feature::FeatureModel& features, map::MapDraft& draft) {
   const map::BundledMap& map = draft.map();
-  if (map.scale() != map::Scale::kMetric) return false;
   const KeyframeId here = map.root_of(closure.keyframe), there = map.root_of(closure.matched_keyframe);
-  const bool here_moves = there < here;  // the older submap keeps its pose
+  const bool here_moves = there < here;  // the older submap keeps its pose and its scale
   const KeyframeId moving = here_moves ? here : there;
-  const SE3 T_there_here = place_match.T_rig_world.inverse() * map.keyframe(closure.keyframe).T_rig_world;
+  const double factor = here_moves ? place_match.scale : 1 / place_match.scale;
+  if (map.scale() != map::Scale::kMetric) draft.scale_submap(moving, factor);
+  const SE3 T_here_place = here_moves ? place_match.T_rig_world : geometry::scaled(place_match.T_rig_world, factor);
+  const SE3 T_there_here = T_here_place.inverse() * map.keyframe(closure.keyframe).T_rig_world;
   const SE3 motion = here_moves ? T_there_here : T_there_here.inverse();
 
   map::SetPoses poses;
@@ -238,7 +247,6 @@ bool merge_submaps(const LoopClosure& closure, const PlaceMatch& place_match, co
   std::vector<SE3> T_window;
   for (const KeyframeId k : window) T_window.push_back(draft.map().keyframe(k).T_rig_world);
   fuse(window, T_window, closure, place_match, options, features, draft);
-  return true;
 }
 
 bool close_loop(const LoopClosure& closure, const PlaceMatch& place_match, const LoopOptions& options,
@@ -246,7 +254,7 @@ bool close_loop(const LoopClosure& closure, const PlaceMatch& place_match, const
   const map::BundledMap before = draft.map();
   EssentialGraph graph = essential_graph(before, before.root_of(closure.keyframe), options.edge_weight);
   std::vector<KeyframeId> window = window_of(before, closure.keyframe, options.window);
-  std::erase_if(window, [&](KeyframeId k) { return graph.vertex(k) < 0; });
+  std::erase_if(window, [&](KeyframeId k) { return graph.vertex(k) < 0 || at_place(k, closure); });
 
   // Poses of the window as given by the verification: S_i' = T_i T_k^-1 S_k', in the scale of the window.
   const std::vector<Sim3> S_before = graph.problem.S_world;

@@ -50,11 +50,14 @@ bool due(const map::BundledMap& map, KeyframeId keyframe) {
   return map.scale_deviation() > 0 && keyframe.index() % kCheckInterval == 0 && map.roots().size() == 1;
 }
 
+// No estimate is made from more than `keyframes` keyframes.
+int min_keyframes(const ScaleOptions& options) { return std::min(options.min_keyframes, options.keyframes); }
+
 // Returns true if an estimate from this number of keyframes contradicts the scale of a metric map.
 bool contradicts(const RigScale& found, const map::BundledMap& map, std::size_t keyframes,
                  const ScaleOptions& options) {
   const double deviation = std::hypot(found.deviation, map.scale_deviation());
-  return keyframes >= static_cast<std::size_t>(options.min_keyframes) &&
+  return static_cast<int>(keyframes) >= min_keyframes(options) &&
          std::abs(std::log(found.scale)) > std::max(kContradictionSigmas * deviation, kContradiction);
 }
 
@@ -98,7 +101,7 @@ ScaleReport observe_scale(KeyframeId keyframe, const ScaleOptions& options, cons
 
 bool is_metric(const ScaleReport& report, double deviation_before, const ScaleOptions& options) {
   const double max_deviation = std::min(options.max_deviation, options.max_correcting_deviation);
-  return report.observed && report.keyframes >= options.min_keyframes && report.deviation <= max_deviation &&
+  return report.observed && report.keyframes >= min_keyframes(options) && report.deviation <= max_deviation &&
          deviation_before <= max_deviation &&
          std::abs(report.correction - 1.0) <= kMaxMetricCorrectionSigmas * report.deviation;
 }

@@ -255,10 +255,11 @@ TEST_F(ScaleDrift, FramesFollowTheScaleOfTheirKeyframe) {
 // Two paths along the same wall; before the second one tracking restarted at another pose.
 class MergeSubmaps : public ::testing::TestWithParam<int> {
  protected:
-  MergeSubmaps() : world(rig_of(GetParam())) {
+  // `log_scale`: of the younger submap.
+  explicit MergeSubmaps(double log_scale = 0) : world(rig_of(GetParam())) {
     const FeatureSimulator simulator = hall(rig_of(GetParam()));
     for (int i = 0; i < 8; ++i) world.add(simulator.frame(FrameId(i), kStepS * i));
-    const Sim3 elsewhere(Sim3::exp((geometry::Vector7d() << 0.2, -0.3, 1.9, 5, -7, 2, 0).finished()));
+    const Sim3 elsewhere(Sim3::exp((geometry::Vector7d() << 0.2, -0.3, 1.9, 5, -7, 2, log_scale).finished()));
     for (int i = 8; i < 18; ++i)
       world.add(simulator.frame(FrameId(i), kStepS * (i - 4) + 0.5), elsewhere, 0, {}, i == 8);
     for (const KeyframeId k : world.map.keyframe_ids()) world.map.set_uncertainty(k, {kInside});
@@ -274,7 +275,7 @@ class MergeSubmaps : public ::testing::TestWithParam<int> {
     EXPECT_TRUE(closure.merged);
     EXPECT_TRUE(plausible(world.map, closure, {}));
     map::MapDraft draft = world.draft();
-    ASSERT_TRUE(merge_submaps(closure, *place_match, {}, kFeatures, draft));
+    merge_submaps(closure, *place_match, {}, kFeatures, draft);
     const map::BundledMap& after = draft.map();
     EXPECT_EQ(after.check_invariants(), std::nullopt);
     EXPECT_EQ(after.roots(), std::vector{KeyframeId(0)});
@@ -306,18 +307,38 @@ class MergeSubmaps : public ::testing::TestWithParam<int> {
 TEST_P(MergeSubmaps, MovesTheYoungerSubmapToTheOlder) { expect_joined(10, 6); }
 TEST_P(MergeSubmaps, MovesTheYoungerSubmapIfTheOlderOneRecognisesIt) { expect_joined(6, 10); }
 
-TEST_P(MergeSubmaps, DoesNotMergeSubmapsOfUnknownScale) {
-  world.map.set_scale(map::Scale::kUpToScale);
-  const auto place_match = located(10, 6);
-  ASSERT_TRUE(place_match);
-  const LoopClosure closure = measure(world.map, KeyframeId(10), *place_match);
-  EXPECT_FALSE(plausible(world.map, closure, {}));
-  map::MapDraft draft = world.draft();
-  EXPECT_FALSE(merge_submaps(closure, *place_match, {}, kFeatures, draft));
-  EXPECT_TRUE(Fingerprint(draft.map()) == Fingerprint(world.map));
-}
+// The younger submap has 0.6 times the scale of the older one.
+class MergeSubmapsUpToScale : public MergeSubmaps {
+ protected:
+  MergeSubmapsUpToScale() : MergeSubmaps(std::log(0.6)) { world.map.set_scale(map::Scale::kUpToScale); }
+  void expect_joined_and_scaled(int keyframe, int with) {
+    auto place_match = located(keyframe, with);
+    ASSERT_TRUE(place_match);
+    const auto scale = relative_scale(world.map, KeyframeId(keyframe), *place_match);
+    ASSERT_TRUE(scale);
+    EXPECT_NEAR(*scale, keyframe < with ? 0.6 : 1 / 0.6, 0.02);
+    place_match->scale = *scale;
+    const LoopClosure closure = measure(world.map, KeyframeId(keyframe), *place_match);
+    ASSERT_TRUE(closure.merged && plausible(world.map, closure, {}));
+    map::MapDraft draft = world.draft();
+    merge_submaps(closure, *place_match, {}, kFeatures, draft);
+    const map::BundledMap& after = draft.map();
+    EXPECT_EQ(after.check_invariants(), std::nullopt);
+    EXPECT_EQ(after.roots(), std::vector{KeyframeId(0)});
+    for (const KeyframeId k : after.keyframe_ids()) {
+      EXPECT_LT(error_of(world, after, k), 0.05);
+      EXPECT_LT(angle_rad(after.keyframe(k).T_rig_world, world.truth(k)), 0.15 * kDegree);
+      EXPECT_LT(landmark_error(world, after, k), 0.08);
+    }
+    expect_refreshed(after);
+  }
+};
+
+TEST_P(MergeSubmapsUpToScale, ScalesTheYoungerSubmap) { expect_joined_and_scaled(10, 6); }
+TEST_P(MergeSubmapsUpToScale, ScalesTheYoungerSubmapIfTheOlderOneRecognisesIt) { expect_joined_and_scaled(6, 10); }
 
 INSTANTIATE_TEST_SUITE_P(Cameras, MergeSubmaps, ::testing::Values(1, 2, 4));
+INSTANTIATE_TEST_SUITE_P(Cameras, MergeSubmapsUpToScale, ::testing::Values(1, 2));
 
 }  // namespace
 }  // namespace bslam::looping

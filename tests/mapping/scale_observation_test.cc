@@ -56,11 +56,10 @@ synthetic::Trajectory straight_line() {
   return synthetic::Trajectory(std::move(control), 1.0);
 }
 
-// Ratio of lengths in the map to true lengths.
-double length_ratio(const SimulatedMap& world, const map::BundledMap& map) {
+// Ratio of lengths in a submap to true lengths.
+double length_ratio(const SimulatedMap& world, const map::BundledMap& map, KeyframeId root = KeyframeId(0)) {
   double found = 0, truth = 0;
-  const KeyframeId root(0);
-  for (const KeyframeId k : map.keyframe_ids()) {
+  for (const KeyframeId k : map.keyframes_of_submap(root)) {
     found += map::distance_m(map.keyframe(k).T_rig_world, map.keyframe(root).T_rig_world);
     truth += map::distance_m(world.true_pose(k), world.true_pose(root));
   }
@@ -102,6 +101,39 @@ TEST(ObserveScale, ConvergesFromThreeTimesTooLargeOrTooSmall) {
     EXPECT_NEAR(length_ratio(world, draft.map()), 1.0, 3.5 * draft.map().scale_deviation()) << factor;
     EXPECT_EQ(draft.map().check_invariants(), std::nullopt);
   }
+}
+
+// Two submaps with different scales, the older one of which has `keyframes` keyframes.
+SimulatedMap with_older_submap(int keyframes) {
+  SimulatedMap world = simulated_map(orbit(1), three_sides(), keyframes, 1.4, 1);
+  world.begin_submap();
+  const KeyframeId root = world.add_keyframe(FrameId(20), 0.25 * 20);
+  for (int i = 21; i < 28; ++i) world.add_keyframe(FrameId(i), 0.25 * i);
+  world.map.scale_submap(root, 0.8);
+  return world;
+}
+
+TEST(ObserveScale, BecomesMetricIfTheScalesOfAllSubmapsAreObservable) {
+  const SimulatedMap world = with_older_submap(6);
+  const KeyframeId newest = world.map.newest_keyframe();
+  map::MapDraft draft = world.draft();
+  for (int i = 0; i < 3; ++i) map_keyframe(newest, independent_noise(), kFeatures, draft);
+  EXPECT_EQ(draft.map().scale(), map::Scale::kMetric);
+  ASSERT_EQ(draft.map().roots().size(), 2u);
+  for (const KeyframeId root : draft.map().roots())
+    EXPECT_NEAR(length_ratio(world, draft.map(), root), 1.0, 3.5 * draft.map().scale_deviation());
+  EXPECT_LE(draft.map().scale_deviation(), 0.1);
+  EXPECT_EQ(draft.map().check_invariants(), std::nullopt);
+}
+
+TEST(ObserveScale, IsUnobservableIfThatOfAnOlderSubmapIs) {
+  const SimulatedMap world = with_older_submap(1);
+  const KeyframeId newest = world.map.newest_keyframe();
+  map::MapDraft draft = world.draft();
+  for (int i = 0; i < 3; ++i) map_keyframe(newest, independent_noise(), kFeatures, draft);
+  EXPECT_EQ(draft.map().scale(), map::Scale::kUnobservable);
+  EXPECT_NEAR(length_ratio(world, draft.map(), draft.map().roots().back()), 1.0, 0.05);
+  EXPECT_LE(draft.map().scale_deviation(), 0.02);  // that of the newest submap
 }
 
 TEST(ObserveScale, IsUnobservableOnAStraightLine) {

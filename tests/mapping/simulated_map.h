@@ -64,7 +64,8 @@ class SimulatedMap {
         unknown.emplace_back(f, truth);
       }
     }
-    const KeyframeId k = map.add_keyframe(stored, seen.T_world_rig.inverse(), known, map.newest_keyframe());
+    const KeyframeId parent = std::exchange(new_submap_, false) ? KeyframeId() : map.newest_keyframe();
+    const KeyframeId k = map.add_keyframe(stored, seen.T_world_rig.inverse(), known, parent);
     for (const auto& [f, truth] : unknown) {
       const Observation observation{k, f};
       const LandmarkId l = map.add_landmark(truth_of(truth), std::span(&observation, 1));
@@ -73,6 +74,12 @@ class SimulatedMap {
     }
     for (const auto& [f, l] : known) map.refresh_landmark(l);
     return k;
+  }
+
+  // The next keyframe is the root of a submap, which shares no landmarks with the others.
+  void begin_submap() {
+    new_submap_ = true;
+    landmark_of.clear();
   }
 
   const Eigen::Vector3d& truth_of(int landmark) const {
@@ -97,6 +104,9 @@ class SimulatedMap {
   std::vector<SimulatedFrame> frames;                      // one per keyframe
   std::unordered_map<int, LandmarkId> landmark_of;
   std::unordered_map<int, int> truth_of_landmark;  // by id
+
+ private:
+  bool new_submap_ = false;  // the next keyframe is a root
 };
 
 // Distance in metres between the centres, and angle in radians between the orientations, of two poses T_rig_world.
