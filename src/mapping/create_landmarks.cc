@@ -38,6 +38,11 @@ struct View {
 
 SE3 cam_from_world(const map::BundledMap& map, View v) { return map.cam_from_world(v.keyframe, v.camera); }
 
+double baseline(const map::BundledMap& map, View a, View b) {
+  const auto centre = [&](View v) { return cam_from_world(map, v).inverse().translation().eval(); };
+  return (centre(a) - centre(b)).norm();
+}
+
 // Returns true if camera b observes enough of the points that camera a observes at a depth of about `depth` metres.
 bool shares_view(const map::BundledMap& map, View a, View b, double depth) {
   const feature::Keypoints& keypoints = map.keypoints(a.keyframe, a.camera);
@@ -92,7 +97,7 @@ std::optional<Vector3d> new_point(const map::BundledMap& map, View a, const matc
 int create_between(View a, View b, double depth, const CreationOptions& options, const FeatureModel& features,
                    map::MapDraft& draft) {
   const map::BundledMap& map = draft.map();
-  if (!shares_view(map, a, b, depth)) return 0;
+  if (baseline(map, a, b) < options.min_baseline_over_depth * depth || !shares_view(map, a, b, depth)) return 0;
   const std::vector<std::uint8_t> free_a = free_keypoints(map.keyframe(a.keyframe), a.camera);
   const std::vector<std::uint8_t> free_b = free_keypoints(map.keyframe(b.keyframe), b.camera);
   const auto view = [&](View v, std::span<const std::uint8_t> free) {
@@ -132,11 +137,8 @@ int create_landmarks(KeyframeId keyframe, const CreationOptions& options, const 
   const double depth = map::median_depth(draft.map(), keyframe);
   if (depth <= 0) return 0;
   int made = 0;
-  const Vector3d centre = draft.map().keyframe(keyframe).T_rig_world.inverse().translation();
   for (const map::Covisible& neighbour :
        draft.map().best_covisible(keyframe, static_cast<std::size_t>(options.neighbours))) {
-    const Vector3d other = draft.map().keyframe(neighbour.keyframe).T_rig_world.inverse().translation();
-    if ((centre - other).norm() < options.min_baseline_over_depth * depth) continue;
     for (std::size_t i = 0; i < draft.map().rig().size(); ++i) {
       for (std::size_t j = 0; j < draft.map().rig().size(); ++j) {
         made += create_between({keyframe, CameraIndex(i)}, {neighbour.keyframe, CameraIndex(j)}, depth, options,

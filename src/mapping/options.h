@@ -9,7 +9,7 @@ namespace bslam::mapping {
 
 struct CreationOptions {
   int neighbours = 6;                     // covisible keyframes matched for new landmarks
-  double min_baseline_over_depth = 0.01;  // minimum baseline relative to the median depth; a shorter one gives no depth
+  double min_baseline_over_depth = 0.01;  // minimum distance of two cameras relative to the median depth
   int max_hamming = 50;                   // bits, maximum descriptor distance
   double ratio = 0.8;                     // maximum ratio of best to second best distance along the epipolar curve
   double min_parallax = 0.012;            // rad, minimum angle between the rays of a new landmark
@@ -20,7 +20,8 @@ struct CreationOptions {
   static void visit(Self& self, Visitor& visitor) {
     visitor("neighbours", self.neighbours, Range{0, 100}, "", "covisible keyframes matched for new landmarks");
     visitor("min_baseline_over_depth", self.min_baseline_over_depth, Range{0, 1}, "",
-            "minimum baseline relative to the median depth", OptionNote{.formerly = "min_baseline_share"});
+            "minimum distance of two cameras relative to the median depth",
+            OptionNote{.formerly = "min_baseline_share"});
     visitor("max_hamming", self.max_hamming, Range{1, 256}, "bits",
             "maximum descriptor distance of a new landmark's features");
     visitor("ratio", self.ratio, Range{0.1, 1}, "",
