@@ -158,7 +158,7 @@ class LaggedExecutor : public StageExecutor {
     const bool committed = wait_for(*job) && commit_result(*job);
     leave(stage);
     if (committed) {
-      for (const StageTask& next : following(job->task, setup_.functions)) push(next);
+      for (const StageTask& next : following(job->task, *gate_.newest(), setup_.functions)) push(next);
     }
     start_next(stage);
   }

@@ -169,7 +169,7 @@ class ParallelExecutor : public StageExecutor {
       close();
     }
     if (committed) {
-      for (const StageTask& next : following(task, setup_.functions)) push(next, lock);
+      for (const StageTask& next : following(task, *gate_.newest(), setup_.functions)) push(next, lock);
     }
     queue(task.stage).running.reset();
     changed_.notify_all();

@@ -116,7 +116,8 @@ class ReplayExecutor : public StageExecutor {
     if (committed != entry().committed.has_value()) fail(committed ? "a commit" : "no commit");
     if (committed) {
       keep(gate_.newest());
-      for (const StageTask& next : following(task, setup_.functions)) waiting(next.stage).push_back(next);
+      for (const StageTask& next : following(task, *gate_.newest(), setup_.functions))
+        waiting(next.stage).push_back(next);
     }
     advance();
   }

@@ -20,7 +20,7 @@ class SequentialExecutor : public StageExecutor {
     std::deque<StageTask> tasks = {task};
     for (; !tasks.empty() && !over(); tasks.pop_front()) {
       if (!run_to_commit(tasks.front(), gate_.newest(), gate_, setup_, stop_.get_token())) continue;
-      for (const StageTask& next : following(tasks.front(), setup_.functions)) tasks.push_back(next);
+      for (const StageTask& next : following(tasks.front(), *gate_.newest(), setup_.functions)) tasks.push_back(next);
     }
   }
 

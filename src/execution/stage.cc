@@ -1,5 +1,7 @@
 #include "execution/stage.h"
 
+#include <algorithm>
+
 namespace bslam::execution {
 
 std::string_view stage_name(Stage stage) {
@@ -31,26 +33,37 @@ constexpr std::size_t kFirstCalibration = 8, kSecondCalibration = 12;  // keyfra
 // estimate of a wrong calibration, and so the poses of the following frames, noticeably more accurate.
 std::size_t next_calibration(std::size_t due) { return due < kSecondCalibration ? kSecondCalibration : due + due / 4; }
 
+// The number of keyframe slots from the first keyframe of the map to this one. Maps that were discarded before do not
+// count.
+std::size_t slots_before(KeyframeId keyframe, const map::BundledMap& map) {
+  std::size_t first = 0;
+  while (first < map.keyframe_slots() && !map.alive(KeyframeId(first))) ++first;
+  return keyframe.index() - std::min(first, keyframe.index());
+}
+
 }  // namespace
 
-std::optional<int> calibration_due(KeyframeId keyframe) {
+std::optional<int> calibration_due(KeyframeId keyframe, const map::BundledMap& map) {
+  const std::size_t before = slots_before(keyframe, map);
   int number = 0;
-  for (std::size_t due = kFirstCalibration; due <= keyframe.index(); due = next_calibration(due), ++number) {
-    if (due == keyframe.index()) return number;
+  for (std::size_t due = kFirstCalibration; due <= before; due = next_calibration(due), ++number) {
+    if (due == before) return number;
   }
   return std::nullopt;
 }
 
-bool before_first_calibration(KeyframeId keyframe) { return keyframe.index() <= kFirstCalibration; }
+bool before_first_calibration(KeyframeId keyframe, const map::BundledMap& map) {
+  return slots_before(keyframe, map) <= kFirstCalibration;
+}
 
 bool awaited(const StageTask& task, const map::BundledMap& newest) {
   constexpr int kVerdicts = 2, kRefinements = 8;  // calibrations
   switch (task.stage) {
     case Stage::kKeyframe:
     case Stage::kMap:
-      return newest.keyframe_slots() <= kSecondCalibration + 1;
+      return slots_before(KeyframeId(newest.keyframe_slots()), newest) <= kSecondCalibration + 1;
     case Stage::kCalibrate: {
-      const int number = calibration_due(task.keyframe).value_or(kRefinements);
+      const int number = calibration_due(task.keyframe, newest).value_or(kRefinements);
       return number < kVerdicts || (newest.rig_deviation() && number < kRefinements);
     }
     case Stage::kLoop:
@@ -60,13 +73,14 @@ bool awaited(const StageTask& task, const map::BundledMap& newest) {
   return false;
 }
 
-std::vector<StageTask> following(const StageTask& task, const StageFunctions& functions) {
+std::vector<StageTask> following(const StageTask& task, const map::BundledMap& newest,
+                                 const StageFunctions& functions) {
   std::vector<StageTask> out;
   const auto add = [&](Stage stage) {
     if (functions[stage]) out.push_back({stage, task.keyframe});
   };
   if (task.stage == Stage::kKeyframe) add(Stage::kMap);
-  if (task.stage == Stage::kMap && calibration_due(task.keyframe)) add(Stage::kCalibrate);
+  if (task.stage == Stage::kMap && calibration_due(task.keyframe, newest)) add(Stage::kCalibrate);
   if (task.stage == Stage::kMap) add(Stage::kLoop);
   if (task.stage == Stage::kLoop) add(Stage::kGlobal);
   return out;

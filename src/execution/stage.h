@@ -56,16 +56,17 @@ struct StageFunctions {
   StageFunction& operator[](Stage s) { return by_stage[static_cast<std::size_t>(s)]; }
 };
 
-// The tasks that follow the commit of another one, in order. The keyframe of the task must be known.
-std::vector<StageTask> following(const StageTask& task, const StageFunctions& functions);
+// The tasks that follow the commit of another one, in order. The keyframe of the task must be known. `newest` is the
+// newest version of the map.
+std::vector<StageTask> following(const StageTask& task, const map::BundledMap& newest, const StageFunctions& functions);
 
 // Number of the calibration of the rig that follows the mapping of a keyframe, counted from 0; nullopt if none does.
 // The keyframes at which calibrations run are spaced geometrically, because the cost of a calibration grows with the
 // size of the map and its benefit decreases.
-std::optional<int> calibration_due(KeyframeId keyframe);
+std::optional<int> calibration_due(KeyframeId keyframe, const map::BundledMap& map);
 
-// Whether no calibration of a map that begins with keyframe 0 has been finished when this keyframe is mapped.
-bool before_first_calibration(KeyframeId keyframe);
+// Whether no calibration of the map has been finished when this keyframe is mapped.
+bool before_first_calibration(KeyframeId keyframe, const map::BundledMap& map);
 
 // Whether the next frame waits for a task (ExecutionOptions::await_calibration). Tracking with a wrong calibration
 // loses observations, cameras or the scale, which no later adjustment brings back. The first keyframes are therefore

@@ -13,7 +13,7 @@ execution::StageResult map_keyframe(const Config& config, const std::shared_ptr<
   if (!base->alive(task.keyframe)) return {};
   map::MapDraft draft(base);
   mapping::map_keyframe(task.keyframe, config.mapping, config.feature_model(), draft, std::move(stop),
-                        execution::before_first_calibration(task.keyframe) ? rig_prior : nullptr);
+                        execution::before_first_calibration(task.keyframe, *base) ? rig_prior : nullptr);
   return {std::move(draft), {}};
 }
 
@@ -45,7 +45,7 @@ bool left_out(const calibration::CalibrationOptions& options, const map::Bundled
               KeyframeId first, KeyframeId keyframe) {
   if (options.refine == calibration::Refine::kTrue || calibration::replaced(map.rig(), given_rig)) return false;
   if (first.index() > 0 || map.scale_deviation() > 0) return false;
-  const int number = execution::calibration_due(keyframe).value_or(0);
+  const int number = execution::calibration_due(keyframe, map).value_or(0);
   return number >= 2 && number % 4 != 1;
 }
 

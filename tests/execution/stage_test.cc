@@ -40,5 +40,21 @@ TEST(Stage, FramesAwaitTheFirstCalibrations) {
   EXPECT_FALSE(awaited({Stage::kGlobal, KeyframeId(3)}, empty));
 }
 
+TEST(Stage, KeyframesOfADiscardedMapDoNotCount) {
+  const StageWorld world;
+  map::MapStore store{world.empty_map()};
+  for (int i = 0; i < 20; ++i) store.commit(world.with_keyframe(FrameId(i), store.snapshot()));
+  EXPECT_EQ(calibration_due(KeyframeId(12), *store.snapshot()), 1);
+  EXPECT_FALSE(calibration_due(KeyframeId(28), *store.snapshot()).has_value());
+  EXPECT_FALSE(before_first_calibration(KeyframeId(24), *store.snapshot()));
+  store.restart();
+  store.commit(world.with_keyframe(FrameId(20), store.snapshot()));
+  ASSERT_EQ(store.snapshot()->newest_keyframe(), KeyframeId(20));
+  EXPECT_EQ(calibration_due(KeyframeId(28), *store.snapshot()), 0);
+  EXPECT_FALSE(calibration_due(KeyframeId(23), *store.snapshot()).has_value());
+  EXPECT_TRUE(before_first_calibration(KeyframeId(24), *store.snapshot()));
+  EXPECT_TRUE(awaited({Stage::kCalibrate, KeyframeId(28)}, *store.snapshot()));
+}
+
 }  // namespace
 }  // namespace bslam::execution
