@@ -94,12 +94,14 @@ TimeNs shift_of(const camera::Rig& given, const camera::Rig& final_rig, std::siz
   return final_rig.camera(camera).time_offset_ns - given.camera(camera).time_offset_ns;
 }
 
-// Whether mirrored images explain clearly more matches of a pair than its calibration before and after refinement.
-bool is_mirrored(const PairEvidence& given, const PairEvidence& refined) {
+// Whether mirrored images, exchanged cameras or inverted transforms explain clearly more matches of a pair than its
+// calibration before and after refinement.
+bool is_mistaken(const PairEvidence& given, const PairEvidence& refined) {
   constexpr double kMuchMore = 0.15;  // share of matches
-  const int mirrored = given.agreeing[static_cast<std::size_t>(Convention::kMirrored)];
-  return given.verdict == Convention::kMirrored && mirrored >= kGoodShare * given.matches &&
-         mirrored >= refined.agreeing[0] + kMuchMore * given.matches;
+  if (!given.verdict || given.verdict == Convention::kAsGiven) return false;
+  const int explained = given.with(*given.verdict);
+  return explained >= kGoodShare * given.matches && explained >= refined.agreeing[0] + kMuchMore * given.matches &&
+         (given.verdict == Convention::kMirrored || explained >= kClearly * given.agreeing[0]);
 }
 
 }  // namespace
@@ -137,18 +139,18 @@ std::vector<CameraPair> test_pairs(const map::BundledMap& map, std::span<const K
     CameraPair& pair = pairs[p];
     const std::size_t i = pair.first, j = pair.second;
     // The refinement may have estimated an offset between cameras that capture at the same time.
-    const bool for_mirrors_only = common[p].empty() || (sound[i] && sound[j]);
+    const bool was_matched = common[p].empty() || (sound[i] && sound[j]);
     if (suspected && common[p].empty())
       common[p] = common_keyframes(map, keyframes, first_camera + i, first_camera + j,
                                    shift_of(given, final_rig, i) - shift_of(given, final_rig, j));
-    if (common[p].empty() || (for_mirrors_only && !suspected)) continue;
+    if (common[p].empty() || (was_matched && !suspected)) continue;
     const Views views = spread_views(map, common[p], first_camera + i, first_camera + j, images);
     pair.evidence = judge_pair(given, i, j, views.first, views.second);
     const PairEvidence refined = judge_pair(final_rig, i, j, views.first, views.second);
-    const bool mirrored = is_mirrored(*pair.evidence, refined);
-    if (mirrored) pair.keyframes = static_cast<int>(common[p].size());
+    const bool mistaken = is_mistaken(*pair.evidence, refined);
+    if (mistaken) pair.keyframes = static_cast<int>(common[p].size());
     pair.contradicted =
-        mirrored || (!for_mirrors_only && shows_another_arrangement(*pair.evidence) && !explained_by(refined));
+        mistaken || (!was_matched && shows_another_arrangement(*pair.evidence) && !explained_by(refined));
   }
   return pairs;
 }

@@ -63,14 +63,13 @@ std::vector<CalibratedCamera> by_camera(const camera::Rig& calibrated, const Eig
 std::optional<JointRefinement> combine(const camera::Rig& calibrated, std::span<const RigRefinement> refinements) {
   BSLAM_ASSERT(!refinements.empty(), "there must be an estimate");
   const Eigen::MatrixXd& prior = refinements.front().information.prior;
-  Eigen::MatrixXd information = prior, weights = Eigen::MatrixXd::Zero(prior.rows(), prior.cols());
+  Eigen::MatrixXd information = prior;
   Eigen::VectorXd weighted = Eigen::VectorXd::Zero(prior.rows());
   for (const RigRefinement& r : refinements) {
     information += r.information.information - r.information.prior;
-    weights += r.information.information;
-    weighted += r.information.information * r.information.change;
+    weighted += r.information.information * r.information.change;  // of the images alone: the mean of the prior is zero
   }
-  const Eigen::LLT<Eigen::MatrixXd> factor(weights);
+  const Eigen::LLT<Eigen::MatrixXd> factor(information);
   const auto variance = variances(information), prior_variance = variances(prior);
   if (factor.info() != Eigen::Success || !variance || !prior_variance) return std::nullopt;
   const Eigen::VectorXd change = factor.solve(weighted);

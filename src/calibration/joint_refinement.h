@@ -28,9 +28,9 @@ struct JointRefinement {
   RigInformation information;
 };
 
-// Mean of estimates from different recordings with the same prior, weighted by their information matrices. The
-// resulting covariance includes the prior once. `refinements`: at least one; all `done`, of the same rig `calibrated`
-// and with intrinsics. Returns nullopt if the information is singular.
+// Combines estimates from different recordings with the same prior, whose mean is the given calibration: the images are
+// weighted by their information, and the prior counts once. `refinements`: at least one; all `done`, of the same rig
+// `calibrated` and with intrinsics. Returns nullopt if the information is singular.
 std::optional<JointRefinement> combine(const camera::Rig& calibrated, std::span<const RigRefinement> refinements);
 
 }  // namespace bslam::calibration

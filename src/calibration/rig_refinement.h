@@ -104,7 +104,7 @@ struct CalibrationOptions {
             "added in quadrature: a part in percent of the longest distance of a camera from camera 0");
     visitor("sigma_depth_mm", self.sigma_depth_mm, Range{0, 1e4}, "mm",
             "added in quadrature: a part along the optical axes of the camera and of camera 0");
-    visitor("sigma_scale_percent", self.sigma_scale_percent, Range{1e-6, 100}, "%",
+    visitor("sigma_scale_percent", self.sigma_scale_percent, Range{1e-3, 100}, "%",
             "standard deviation of the common scale of all baselines");
     visitor("sigma_focal_percent", self.sigma_focal_percent, Range{1e-3, 50}, "%",
             "standard deviation of calibrated focal lengths");

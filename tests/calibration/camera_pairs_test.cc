@@ -99,6 +99,19 @@ TEST(CameraPairs, RevealMirroredImagesThatWereMatched) {
   EXPECT_TRUE(moved[0].mirrored());
 }
 
+// The refinement makes images of exchanged cameras fit with points that are far away.
+TEST(CameraPairs, RevealExchangedCamerasThatWereMatched) {
+  const camera::Rig rig = centred_pair();
+  const std::array exchange = {1, 0};
+  const map::SimulatedMap seen = seen_by(rig.subset(exchange), 0.8);
+  EXPECT_FALSE(tested(seen, rig, rig)[0].contradicted);
+  const auto suspected = test_pairs(seen.map, seen.map.keyframe_ids(), 0, rig, rig, true);
+  EXPECT_TRUE(suspected[0].contradicted && !suspected[0].mirrored());
+  // The refinement has found the true arrangement.
+  const auto found = test_pairs(seen.map, seen.map.keyframe_ids(), 0, rig, rig.subset(exchange), true);
+  EXPECT_FALSE(found[0].contradicted);
+}
+
 TEST(CameraPairs, OfDarkOrSeparateViewsAreNotAccused) {
   const camera::Rig rig = turned_pair();
   const std::array exchange = {1, 0};

@@ -52,9 +52,19 @@ TEST(JointRefinement, WeighsEstimatesByTheirInformation) {
   const auto joint = combine(pair.rig, std::vector{pair.estimate(0, 0.01), pair.estimate(0.03, 0.02)});
   ASSERT_TRUE(joint.has_value());
   const CalibratedValue& value = joint->cameras[1].extrinsics[4];
-  EXPECT_NEAR(value.change, 0.03 / 5, 1e-9);
   // The information of both, in which the prior counts once.
+  EXPECT_NEAR(value.change, 0.03 * 2500 / (1e4 + 2500 - 1), 1e-9);
   EXPECT_NEAR(value.std, 1 / std::sqrt(1e4 + 2500 - 1), 1e-9);
+}
+
+TEST(JointRefinement, ManyRecordingsOutweighThePrior) {
+  const Pair pair;
+  // The images of each have as much information as the prior, so that each estimate is half of the true change of 0.1.
+  const double std = std::sqrt(0.5);
+  const auto joint = combine(pair.rig, std::vector(9, pair.estimate(0.05, std)));
+  ASSERT_TRUE(joint.has_value());
+  EXPECT_NEAR(joint->cameras[1].extrinsics[4].change, 0.1 * 9 / 10, 1e-9);
+  EXPECT_NEAR(joint->cameras[1].extrinsics[4].std, std::sqrt(1.0 / 10), 1e-9);
 }
 
 TEST(JointRefinement, WithoutInformationTheValuesAreNotObserved) {
