@@ -186,10 +186,11 @@ void add_stage_run(RunRecord& record, const system::StageRecord& run, TimeNs fir
 }
 
 MapRecord map_record(const map::BundledMap& map, bool loaded) {
+  const bool never_metric = map.num_keyframes() == 0 && map.rig().size() == 1;
   MapRecord record{static_cast<std::int64_t>(map.num_keyframes()),
                    static_cast<std::int64_t>(map.num_landmarks()),
                    static_cast<std::int64_t>(map.num_observations()),
-                   std::string(map::scale_name(map.scale())),
+                   std::string(map::scale_name(never_metric ? map::Scale::kUpToScale : map.scale())),
                    loaded,
                    {}};
   if (std::isfinite(map.scale_deviation()) && map.scale_deviation() > 0) record.scale_deviation = map.scale_deviation();
