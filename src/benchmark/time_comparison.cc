@@ -9,7 +9,7 @@ namespace {
 
 constexpr const char* kNothing = "-";
 
-// Differences of times below this are noise of clock and scheduler.
+// Smaller differences of a time or of memory are measurement noise.
 double resolution_of(std::string_view name) {
   constexpr double kMs = 0.02, kS = 0.02, kMb = 1.0;
   if (name.ends_with("_ms")) return kMs;
@@ -21,8 +21,8 @@ Change change_of(const std::string& name, const Spread& before, const Spread& no
     return high.median > (1 + margin) * low.median && high.median - low.median > resolution_of(name) &&
            high.min > low.max;
   };
-  if (is_above(now, before)) return Change::kSlower;
-  return is_above(before, now) ? Change::kFaster : Change::kNone;
+  if (is_above(now, before)) return Change::kMore;
+  return is_above(before, now) ? Change::kLess : Change::kNone;
 }
 
 std::string ratio_text(double before, double now) {
@@ -99,8 +99,11 @@ std::vector<std::string> notes_of(const TimeConditions& before, const TimeCondit
   };
   note("processor", before.processor, now.processor);
   note("instructions", before.instructions, now.instructions);
-  if (now.mode != "sequential")
-    notes.push_back(fmt::format("counts vary from run to run in mode {}, and are not compared", now.mode));
+  for (const TimeConditions* conditions : {&before, &now}) {
+    if (conditions->mode == "sequential") continue;
+    notes.push_back(fmt::format("counts vary from run to run in mode {}, and are not compared", conditions->mode));
+    break;
+  }
   return notes;
 }
 
@@ -108,9 +111,9 @@ const char* mark(Change change) {
   switch (change) {
     case Change::kNone:
       break;
-    case Change::kFaster:
+    case Change::kLess:
       return "less";
-    case Change::kSlower:
+    case Change::kMore:
       return "MORE";
     case Change::kDiffers:
       return "DIFFERS";
@@ -122,7 +125,7 @@ const char* mark(Change change) {
 
 bool TimeComparison::worse() const {
   return std::ranges::any_of(
-      figures, [](const ComparedFigure& f) { return f.change == Change::kSlower || f.change == Change::kDiffers; });
+      figures, [](const ComparedFigure& f) { return f.change == Change::kMore || f.change == Change::kDiffers; });
 }
 
 TimeComparison compare_times(const TimeReport& before, const TimeReport& now, double margin) {

@@ -10,8 +10,8 @@ namespace bslam::benchmark {
 
 enum class Change {
   kNone,
-  kFaster,
-  kSlower,   // slower, or more memory
+  kLess,     // less time or memory
+  kMore,     // more time or memory
   kDiffers,  // a count differs; counts must be equal
 };
 
@@ -26,12 +26,12 @@ struct TimeComparison {
   std::vector<ComparedFigure> figures;
   // Differences in the conditions, such as another processor, that make the times incomparable.
   std::vector<std::string> notes;
-  bool worse() const;  // a count differs, or a time is slower
+  bool worse() const;  // a count differs, or a time or memory has increased
 };
 
-// A time counts as slower if its median is larger than the earlier one by more than the fraction `margin` and by more
-// than clock and scheduler noise, and if every new run is slower than every earlier run. Counts are compared if both
-// were measured in sequential mode and were equal in all runs.
+// A time or memory has increased if its median is larger than the earlier one by more than the fraction `margin` and by
+// more than measurement noise, and if the value of every new run is larger than that of every earlier run. Counts are
+// compared if both were measured in sequential mode and were equal in all runs.
 TimeComparison compare_times(const TimeReport& before, const TimeReport& now, double margin);
 
 report::Table comparison_table(const TimeComparison& comparison);

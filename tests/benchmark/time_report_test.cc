@@ -104,8 +104,8 @@ TEST(TimeComparison, MarksTimesThatAreSlowerThanTheMarginAndTheSpread) {
   EXPECT_EQ(compared({summary(5), summary(5.2), summary(5.4)}), Change::kNone);
   EXPECT_EQ(compared({summary(5.5), summary(5.6), summary(5.6)}), Change::kNone);  // within 10 %
   EXPECT_EQ(compared({summary(5.3), summary(6.5), summary(6.6)}), Change::kNone);  // one run is as fast as before
-  EXPECT_EQ(compared({summary(5.8), summary(6.5), summary(6.6)}), Change::kSlower);
-  EXPECT_EQ(compared({summary(4.1), summary(4.2), summary(4.3)}), Change::kFaster);
+  EXPECT_EQ(compared({summary(5.8), summary(6.5), summary(6.6)}), Change::kMore);
+  EXPECT_EQ(compared({summary(4.1), summary(4.2), summary(4.3)}), Change::kLess);
   const TimeReport tiny = report_of({summary(0.01)});
   EXPECT_EQ(change_of(compare_times(tiny, report_of({summary(0.02)}), 0.1), "extract: median ms"), Change::kNone);
   EXPECT_TRUE(compare_times(before, report_of({summary(9)}), 0.1).worse());
@@ -123,6 +123,13 @@ TEST(TimeComparison, CountsAreComparedExactlyInSequentialMode) {
       compare_times(report_of({summary(5, 700)}, "parallel"), report_of({summary(5, 701)}, "parallel"), 0.1);
   EXPECT_FALSE(parallel.worse());
   EXPECT_EQ(parallel.notes.size(), 1u);
+  for (const auto& [first, second] : {std::pair("parallel", "sequential"), std::pair("sequential", "parallel")}) {
+    const TimeComparison mixed =
+        compare_times(report_of({summary(5, 700)}, first), report_of({summary(5, 701)}, second), 0.1);
+    EXPECT_FALSE(mixed.worse()) << first;
+    ASSERT_EQ(mixed.notes.size(), 1u) << first;
+    EXPECT_NE(mixed.notes.front().find("mode parallel"), std::string::npos) << mixed.notes.front();
+  }
 }
 
 TEST(TimeComparison, ShowsFiguresThatOnlyOneOfThemHas) {
