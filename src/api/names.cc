@@ -1,4 +1,4 @@
-// Names of the enumerators of the public headers.
+// Text for the enumerators of the public headers, and the version of the library.
 #include <bslam/bslam.h>
 
 namespace bslam {
@@ -33,6 +33,30 @@ std::string_view to_string(LostReason reason) {
       return "unstable-pose";
     case LostReason::kNotFound:
       return "not-found";
+  }
+  return "";
+}
+
+std::string_view to_string(CameraState state) {
+  switch (state) {
+    case CameraState::kOk:
+      return "ok";
+    case CameraState::kDegraded:
+      return "degraded";
+    case CameraState::kOut:
+      return "out";
+  }
+  return "";
+}
+
+std::string_view to_string(Scale scale) {
+  switch (scale) {
+    case Scale::kMetric:
+      return "metric";
+    case Scale::kUpToScale:
+      return "up-to-scale";
+    case Scale::kUnobservable:
+      return "unobservable";
   }
   return "";
 }

@@ -13,7 +13,7 @@
 #include "api/access.h"
 #include "api/bundle_reader.h"
 #include "api/guard.h"
-#include "api/image_sorter.h"
+#include "api/image_grouper.h"
 #include "api/rig_impl.h"
 
 namespace bslam {
@@ -64,7 +64,7 @@ Error moved_from() { return {"Synchronizer::push", "", "a Synchronizer that was 
 
 struct Synchronizer::Impl {
   Impl(const Rig& r, SyncOptions o)
-      : rig(api::Access::impl(r).rig), options(std::move(o)), sorter(rig.size(), options) {
+      : rig(api::Access::impl(r).rig), options(std::move(o)), grouper(rig.size(), options) {
     counts.pushed.resize(rig.size());
     counts.dropped.resize(rig.size());
   }
@@ -81,7 +81,7 @@ struct Synchronizer::Impl {
   const SyncOptions options;
   std::mutex mutex;
   std::condition_variable changed;
-  api::ImageSorter sorter;  // guarded by mutex, like the next four members
+  api::ImageGrouper grouper;  // guarded by mutex, like the next four members
   std::deque<ImageBundle> ready;
   SyncCounts counts;
   bool closed = false;
@@ -117,7 +117,7 @@ Status Synchronizer::Impl::push(std::size_t camera, const CameraImage& image) {
     if (closed) return Error{"Synchronizer::push", "", "an image after close()", "images before close() only"};
     ++counts.pushed[camera];
     std::vector<ImageBundle> bundles;
-    sorter.push(camera, image.time_ns + rig.camera(camera).time_offset_ns, owned, bundles, dropped);
+    grouper.push(camera, image.time_ns + rig.camera(camera).time_offset_ns, owned, bundles, dropped);
     commit(std::move(bundles), dropped, options.max_bundles);
   }
   changed.notify_all();
@@ -131,7 +131,7 @@ Status Synchronizer::Impl::close() {
     if (closed) return {};
     closed = true;
     std::vector<ImageBundle> bundles;
-    sorter.flush(bundles, dropped);
+    grouper.flush(bundles, dropped);
     commit(std::move(bundles), dropped, ready.max_size());
   }
   changed.notify_all();
@@ -232,7 +232,7 @@ SyncCounts Synchronizer::counts() const {
   if (!impl_) return {};
   const std::lock_guard lock(impl_->mutex);
   SyncCounts counts = impl_->counts;
-  counts.waiting = impl_->sorter.waiting();
+  counts.waiting = impl_->grouper.waiting();
   return counts;
 }
 

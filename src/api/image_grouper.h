@@ -15,9 +15,9 @@
 
 namespace bslam::api {
 
-class ImageSorter {
+class ImageGrouper {
  public:
-  ImageSorter(std::size_t cameras, const SyncOptions& options);
+  ImageGrouper(std::size_t cameras, const SyncOptions& options);
 
   // Adds an image. `time_ns` is its time including the camera's time offset. Bundles that become complete are appended
   // to `bundles`, and discarded images to `dropped`.
@@ -40,7 +40,7 @@ class ImageSorter {
 
   bool accept(std::size_t camera, TimeNs time_ns, const CameraImage& image, std::vector<ImageBundle>& bundles,
               std::vector<DroppedImage>& dropped);
-  bool can_be_alone(std::size_t camera, TimeNs time_ns) const;
+  bool can_form_its_own_bundle(std::size_t camera, TimeNs time_ns) const;
   bool watch_clock(std::size_t camera, TimeNs time_ns, std::vector<DroppedImage>& dropped);
   void remove(const ClockWatch::Refuted& refuted, std::vector<DroppedImage>& dropped);
   void update_phases();
@@ -54,7 +54,7 @@ class ImageSorter {
   void emit(const image::GroupedFrame& frame, std::vector<ImageBundle>& bundles);
   void drop(const image::GroupedFrame& frame, std::vector<DroppedImage>& dropped);
   CameraImage take(std::size_t camera, int position);
-  bool belongs_to_anchor(std::size_t camera, TimeNs time_ns) const;
+  bool belongs_to_last_group(std::size_t camera, TimeNs time_ns) const;
   image::FrameGroups grouped() const;
 
   const std::size_t max_images_;
@@ -65,8 +65,8 @@ class ImageSorter {
   ClockWatch clocks_;
   std::optional<TimeNs> last_bundle_ns_;  // time of the last complete bundle in phase with camera 0
   std::optional<TimeNs> last_time_ns_;    // its bundle_time()
-  // Per camera: time of its image in the anchor, the last complete bundle with an image of camera 0; nullopt if none.
-  std::vector<std::optional<TimeNs>> anchor_;
+  // Per camera: time of its image in the last complete bundle with an image of camera 0; nullopt if none.
+  std::vector<std::optional<TimeNs>> last_group_with_camera0_;
 };
 
 }  // namespace bslam::api

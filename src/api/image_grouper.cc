@@ -1,4 +1,4 @@
-#include "api/image_sorter.h"
+#include "api/image_grouper.h"
 
 #include <algorithm>
 #include <cstdlib>
@@ -8,6 +8,7 @@
 namespace bslam::api {
 namespace {
 
+// Half of the range, so that adding a delay cannot overflow.
 constexpr TimeNs kForever = std::numeric_limits<TimeNs>::max() / 2;
 // Number of intervals between images from which the rate of a camera is computed.
 constexpr std::size_t kRateIntervals = 16;
@@ -22,7 +23,7 @@ TimeNs shortest_interval(const std::vector<TimeNs>& times) {
 
 }  // namespace
 
-ImageSorter::ImageSorter(std::size_t cameras, const SyncOptions& options)
+ImageGrouper::ImageGrouper(std::size_t cameras, const SyncOptions& options)
     : max_images_(options.max_images),
       tolerance_(from_seconds(options.tolerance_s)),
       max_wait_(from_seconds(options.max_wait_s)),
@@ -32,25 +33,25 @@ ImageSorter::ImageSorter(std::size_t cameras, const SyncOptions& options)
       recent_(cameras),
       phases_{std::vector<image::CapturePhase>(cameras), tolerance_},
       clocks_(cameras, {max_wait_, silent_after_, from_seconds(options.max_ahead_s)}),
-      anchor_(cameras) {}
+      last_group_with_camera0_(cameras) {}
 
-std::size_t ImageSorter::waiting() const {
+std::size_t ImageGrouper::waiting() const {
   std::size_t count = 0;
   for (const Camera& camera : cameras_) count += camera.waiting.size();
   return count;
 }
 
-void ImageSorter::push(std::size_t camera, TimeNs time_ns, const CameraImage& image, std::vector<ImageBundle>& bundles,
-                       std::vector<DroppedImage>& dropped) {
+void ImageGrouper::push(std::size_t camera, TimeNs time_ns, const CameraImage& image, std::vector<ImageBundle>& bundles,
+                        std::vector<DroppedImage>& dropped) {
   if (accept(camera, time_ns, image, bundles, dropped)) emit_complete(false, bundles, dropped);
 }
 
-void ImageSorter::flush(std::vector<ImageBundle>& bundles, std::vector<DroppedImage>& dropped) {
+void ImageGrouper::flush(std::vector<ImageBundle>& bundles, std::vector<DroppedImage>& dropped) {
   emit_complete(true, bundles, dropped);
 }
 
 // Returns false if the image must be dropped because of the clock of its camera.
-bool ImageSorter::watch_clock(std::size_t c, TimeNs time_ns, std::vector<DroppedImage>& dropped) {
+bool ImageGrouper::watch_clock(std::size_t c, TimeNs time_ns, std::vector<DroppedImage>& dropped) {
   std::vector<TimeNs>& recent = recent_[c];
   std::vector<ClockWatch::Refuted> refuted;
   const ClockWatch::Verdict verdict = clocks_.add(c, time_ns, shortest_interval(recent), refuted);
@@ -62,7 +63,7 @@ bool ImageSorter::watch_clock(std::size_t c, TimeNs time_ns, std::vector<Dropped
 }
 
 // Removes waiting images of a wrong clock.
-void ImageSorter::remove(const ClockWatch::Refuted& refuted, std::vector<DroppedImage>& dropped) {
+void ImageGrouper::remove(const ClockWatch::Refuted& refuted, std::vector<DroppedImage>& dropped) {
   std::erase_if(recent_[refuted.camera], [&](TimeNs time_ns) { return time_ns >= refuted.from_ns; });
   std::erase_if(cameras_[refuted.camera].waiting, [&](const WaitingImage& w) {
     if (w.time_ns < refuted.from_ns) return false;
@@ -71,9 +72,9 @@ void ImageSorter::remove(const ClockWatch::Refuted& refuted, std::vector<Dropped
   });
 }
 
-// Estimates the delays of the cameras relative to camera 0 from their newest images. New delays are used as soon as
-// they make no waiting image too late.
-void ImageSorter::update_phases() {
+// Estimates the delays of the cameras relative to camera 0 from their newest images. New delays are adopted only if
+// they do not put a waiting image before the last complete bundle.
+void ImageGrouper::update_phases() {
   if (recent_[0].empty()) return;
   image::CapturePhases phases = image::capture_phases(recent_, tolerance_, phases_.cameras);
   if (phases == phases_) return;
@@ -83,12 +84,12 @@ void ImageSorter::update_phases() {
       return;
   }
   phases_ = std::move(phases);
-  std::ranges::fill(anchor_, std::nullopt);  // determined with the former delays
+  std::ranges::fill(last_group_with_camera0_, std::nullopt);  // determined with the former delays
 }
 
 // Returns true if the image was added to the waiting images of its camera.
-bool ImageSorter::accept(std::size_t c, TimeNs time_ns, const CameraImage& image, std::vector<ImageBundle>& bundles,
-                         std::vector<DroppedImage>& dropped) {
+bool ImageGrouper::accept(std::size_t c, TimeNs time_ns, const CameraImage& image, std::vector<ImageBundle>& bundles,
+                          std::vector<DroppedImage>& dropped) {
   Camera& camera = cameras_[c];
   const auto drop = [&](DropReason reason) {
     dropped.push_back({c, image.time_ns, reason});
@@ -98,8 +99,8 @@ bool ImageSorter::accept(std::size_t c, TimeNs time_ns, const CameraImage& image
   if (!watch_clock(c, time_ns, dropped)) return drop(DropReason::kFarAhead);
   if (camera.last_ns && time_ns <= *camera.last_ns)
     return drop(DropReason::kTooLate);  // its delay relative to camera 0 has changed
-  const bool late = (last_bundle_ns_ && in_phase(c, time_ns) <= *last_bundle_ns_) || belongs_to_anchor(c, time_ns);
-  if (late && !can_be_alone(c, time_ns)) return drop(DropReason::kTooLate);
+  const bool late = (last_bundle_ns_ && in_phase(c, time_ns) <= *last_bundle_ns_) || belongs_to_last_group(c, time_ns);
+  if (late && !can_form_its_own_bundle(c, time_ns)) return drop(DropReason::kTooLate);
   if (late) {
     last_time_ns_ = camera.last_ns = time_ns;
     bundles.emplace_back().images.resize(cameras_.size());
@@ -114,7 +115,7 @@ bool ImageSorter::accept(std::size_t c, TimeNs time_ns, const CameraImage& image
 
 // Returns true if an image that is too late for its bundle can be a bundle of its own, the next one in order of time,
 // since no camera has an earlier image, and none is expected. This happens when the delays of the cameras change.
-bool ImageSorter::can_be_alone(std::size_t c, TimeNs time_ns) const {
+bool ImageGrouper::can_form_its_own_bundle(std::size_t c, TimeNs time_ns) const {
   if (last_time_ns_ && time_ns <= *last_time_ns_ + phases_.tolerance_ns) return false;
   for (std::size_t d = 0; d < cameras_.size(); ++d) {
     if (!cameras_[d].waiting.empty() && cameras_[d].waiting[0].time_ns <= time_ns) return false;
@@ -123,16 +124,17 @@ bool ImageSorter::can_be_alone(std::size_t c, TimeNs time_ns) const {
   return true;
 }
 
-// Returns true if the image would be in the anchor if it had come earlier.
-bool ImageSorter::belongs_to_anchor(std::size_t c, TimeNs time_ns) const {
-  if (c == 0 || !anchor_[0]) return false;
-  const TimeNs distance = std::abs(in_phase(c, time_ns) - *anchor_[0]);
+// Returns true if the image would be in the last bundle with an image of camera 0 if it had come earlier.
+bool ImageGrouper::belongs_to_last_group(std::size_t c, TimeNs time_ns) const {
+  if (c == 0 || !last_group_with_camera0_[0]) return false;
+  const TimeNs distance = std::abs(in_phase(c, time_ns) - *last_group_with_camera0_[0]);
   return distance <= phases_.tolerance_ns &&
-         (!anchor_[c] || distance < std::abs(in_phase(c, *anchor_[c]) - *anchor_[0]));
+         (!last_group_with_camera0_[c] ||
+          distance < std::abs(in_phase(c, *last_group_with_camera0_[c]) - *last_group_with_camera0_[0]));
 }
 
 // Returns the time, in phase with camera 0, up to which no further image of the camera is expected.
-TimeNs ImageSorter::complete_until(std::size_t c) const {
+TimeNs ImageGrouper::complete_until(std::size_t c) const {
   const std::vector<TimeNs>& recent = recent_[c];
   const TimeNs last_ns = recent.empty() ? clocks_.first_ns() : recent.back();
   if (clocks_.newest_ns() - last_ns > silent_after_) return kForever;
@@ -142,26 +144,27 @@ TimeNs ImageSorter::complete_until(std::size_t c) const {
   return in_phase(c, std::max(next_due, timeout));
 }
 
-// Groups all waiting images. The anchor bundle is included, because images that are nearest to its image of camera 0
-// must not join another bundle.
-image::FrameGroups ImageSorter::grouped() const {
+// Groups all waiting images. The last bundle with an image of camera 0 takes part, because images that are nearest to
+// its image of camera 0 must not join another bundle.
+image::FrameGroups ImageGrouper::grouped() const {
   std::vector<std::vector<TimeNs>> times(cameras_.size());
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
-    if (anchor_[c]) times[c].push_back(in_phase(c, *anchor_[c]));
+    if (last_group_with_camera0_[c]) times[c].push_back(in_phase(c, *last_group_with_camera0_[c]));
     for (const WaitingImage& w : cameras_[c].waiting) times[c].push_back(in_phase(c, w.time_ns));
   }
   image::FrameGroups groups = image::group_frames(times, phases_.tolerance_ns);
-  if (!anchor_[0]) return groups;
+  if (!last_group_with_camera0_[0]) return groups;
   std::erase_if(groups.frames, [](const image::GroupedFrame& frame) { return frame.images[0] == 0; });
   for (image::GroupedFrame& frame : groups.frames) {
-    for (std::size_t c = 0; c < cameras_.size(); ++c) frame.images[c] -= anchor_[c] && frame.images[c] > 0;
+    for (std::size_t c = 0; c < cameras_.size(); ++c)
+      frame.images[c] -= last_group_with_camera0_[c] && frame.images[c] > 0;
   }
   return groups;
 }
 
 // Returns true if no future image can change the frame. A future image could be nearer to camera 0's image, be the
-// image of a camera that has none in the frame, or be an image of camera 0 that an image of the frame joins.
-bool ImageSorter::is_complete(const image::GroupedFrame& frame) const {
+// image of a camera that has none in the frame, or be an image of camera 0 that is nearer to an image of the frame.
+bool ImageGrouper::is_complete(const image::GroupedFrame& frame) const {
   const bool has_camera0 = frame.images[0] >= 0;
   TimeNs farthest = 0;
   for (std::size_t c = 1; c < cameras_.size(); ++c) {
@@ -179,11 +182,11 @@ bool ImageSorter::is_complete(const image::GroupedFrame& frame) const {
   return complete_until(0) > frame.time_ns + farthest + phases_.tolerance_ns;
 }
 
-bool ImageSorter::exceeds_limit() const {
+bool ImageGrouper::exceeds_limit() const {
   return std::ranges::any_of(cameras_, [&](const Camera& c) { return c.waiting.size() > max_images_; });
 }
 
-void ImageSorter::emit_complete(bool last, std::vector<ImageBundle>& bundles, std::vector<DroppedImage>& dropped) {
+void ImageGrouper::emit_complete(bool last, std::vector<ImageBundle>& bundles, std::vector<DroppedImage>& dropped) {
   while (waiting() > 0) {
     const image::FrameGroups groups = grouped();
     if (groups.frames.empty()) return;
@@ -203,12 +206,13 @@ void ImageSorter::emit_complete(bool last, std::vector<ImageBundle>& bundles, st
   }
 }
 
-// Returns the frame of the earliest bundle that can be the next one, which is the first frame unless the delays of the
-// cameras are changing: an image whose delay is not the known one can be earlier than the images of camera 0 before it.
-const image::GroupedFrame& ImageSorter::earliest(const image::FrameGroups& groups) const {
+// Returns the frame whose bundle comes first in time. This is the first frame unless the estimated delays are out of
+// date: then a later frame may contain an earlier image.
+const image::GroupedFrame& ImageGrouper::earliest(const image::FrameGroups& groups) const {
   const image::GroupedFrame* first = &groups.frames.front();
   for (const image::GroupedFrame& frame : groups.frames) {
-    const bool in_order = std::ranges::all_of(frame.images, [](int at) { return at <= 0; });  // none of a camera waits
+    // no earlier image of any of its cameras is waiting
+    const bool in_order = std::ranges::all_of(frame.images, [](int at) { return at <= 0; });
     if (in_order && bundle_time(frame) < bundle_time(*first)) first = &frame;
   }
   return *first;
@@ -216,7 +220,7 @@ const image::GroupedFrame& ImageSorter::earliest(const image::FrameGroups& group
 
 // Returns the time of camera 0's image, or of the earliest image, which System::process takes as the time of the
 // bundle.
-TimeNs ImageSorter::bundle_time(const image::GroupedFrame& frame) const {
+TimeNs ImageGrouper::bundle_time(const image::GroupedFrame& frame) const {
   if (frame.images[0] >= 0) return frame.time_ns;
   TimeNs earliest_ns = kForever;
   for (std::size_t c = 1; c < cameras_.size(); ++c) {
@@ -226,12 +230,12 @@ TimeNs ImageSorter::bundle_time(const image::GroupedFrame& frame) const {
   return earliest_ns;
 }
 
-void ImageSorter::emit(const image::GroupedFrame& frame, std::vector<ImageBundle>& bundles) {
+void ImageGrouper::emit(const image::GroupedFrame& frame, std::vector<ImageBundle>& bundles) {
   if (frame.images[0] >= 0) {
     for (std::size_t c = 0; c < cameras_.size(); ++c) {
-      anchor_[c] = frame.images[c] < 0
-                       ? std::nullopt
-                       : std::optional(cameras_[c].waiting[static_cast<std::size_t>(frame.images[c])].time_ns);
+      last_group_with_camera0_[c] =
+          frame.images[c] < 0 ? std::nullopt
+                              : std::optional(cameras_[c].waiting[static_cast<std::size_t>(frame.images[c])].time_ns);
     }
   }
   last_time_ns_ = bundle_time(frame);
@@ -244,16 +248,15 @@ void ImageSorter::emit(const image::GroupedFrame& frame, std::vector<ImageBundle
   }
 }
 
-// Drops images that are too late: a nearer image of their camera has replaced them in their bundle after a later bundle
-// was complete, or they were captured before the last bundle although, corrected for the delay, they follow it.
-void ImageSorter::drop(const image::GroupedFrame& frame, std::vector<DroppedImage>& dropped) {
+// Drops the images of a frame that comes too late: a bundle of the same or a later time is already complete.
+void ImageGrouper::drop(const image::GroupedFrame& frame, std::vector<DroppedImage>& dropped) {
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
     if (frame.images[c] >= 0) dropped.push_back({c, take(c, frame.images[c]).time_ns, DropReason::kTooLate});
   }
 }
 
 // Removes a waiting image.
-CameraImage ImageSorter::take(std::size_t c, int position) {
+CameraImage ImageGrouper::take(std::size_t c, int position) {
   const auto at = cameras_[c].waiting.begin() + position;
   CameraImage image = std::move(at->image);
   cameras_[c].waiting.erase(at);
