@@ -1,5 +1,5 @@
-// Large maps: makes one of copies of a smaller map beside each other, and measures what it takes to load it, to find
-// places in it, and to hold it.
+// Benchmark of large maps: "make" writes a map of shifted copies of a smaller map, "measure" reports the time to load a
+// map, the time of place recognition, and the memory.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -161,9 +161,11 @@ Status measure(const Arguments& a) {
   MemoryCount count;
   const map::MapMemory memory = map.memory(count);
   fmt::print(
-      "of its own: {} MB; keyframes {}, features {}, patches {}, landmarks {}, observations {}, covisibility {}\n",
-      memory.total() >> 20, memory.keyframes >> 20, memory.features >> 20, memory.patches >> 20, memory.landmarks >> 20,
-      memory.observations >> 20, memory.covisibility >> 20);
+      "map: {} MB; keyframes {}, features {}, descriptors {}, patches {}, words {}, landmarks {}, observations {}, "
+      "covisibility {}\n",
+      memory.total() >> 20, memory.keyframes >> 20, memory.features >> 20, memory.descriptors >> 20,
+      memory.patches >> 20, memory.words >> 20, memory.landmarks >> 20, memory.observations >> 20,
+      memory.covisibility >> 20);
   const auto vocabulary = storage::vocabulary_or_shipped("");
   if (!vocabulary) return vocabulary.error();
   const system::Config config;
@@ -188,7 +190,7 @@ int main(int argc, char** argv) {
   CLI::App* const make = app.add_subcommand("make", "writes a map of shifted copies of a map");
   make->add_option("map", a.map, "a saved map")->required();
   make->add_option("out", a.out, "the map to write")->required();
-  make->add_option("--copies", a.copies, "number of copies")->capture_default_str();
+  make->add_option("--copies", a.copies, "number of copies, including the unchanged map")->capture_default_str();
   make->add_option("--bits", a.bits, "bits of each descriptor that are changed in each copy")->capture_default_str();
   CLI::App* const measure = app.add_subcommand("measure", "measures loading, memory and recognition of places");
   measure->add_option("map", a.map, "a saved map")->required();

@@ -8,6 +8,11 @@
 
 #include "euroc_images.h"
 
+void print_pose(const bslam::FrameResult& frame) {
+  const auto& t = frame.T_world_body.translation;  // metres if frame.scale is metric
+  std::cout << "position " << t[0] << ' ' << t[1] << ' ' << t[2] << '\n';
+}
+
 int main(int argc, char** argv) {
   const std::string data = argc > 1 ? argv[1] : ".";
   const double speed = argc > 2 ? std::stod(argv[2]) : 1.0;
@@ -45,11 +50,7 @@ int main(int argc, char** argv) {
   while (const auto bundle = synchronizer->wait()) {
     const auto frame = slam->process(*bundle);
     if (!frame) failed(frame);
-    if (frame && frame->frame % 10 == 0) {
-      const auto& t = frame->T_world_body.translation;  // metres, while tracking
-      std::cout << to_string(frame->status) << ": " << t[0] << ' ' << t[1] << ' ' << t[2] << '\n';
-    }
-    tracked += frame && frame->tracking();
+    if (frame && frame->tracking() && ++tracked % 10 == 1) print_pose(*frame);
   }
   for (std::thread& camera : cameras) camera.join();
   const auto finished = slam->finish();

@@ -172,8 +172,8 @@ void add_simulate(CLI::App& app, int& exit_status) {
       ->capture_default_str();
   verb->add_option("--noise", a.noise, "factor applied to the sensor noise")->capture_default_str();
   verb->add_option("--faults", a.faults,
-                   "YAML or JSON list of {type, cameras, from, to}; type: black, frozen, over_exposed, blurred, "
-                   "dropped or delayed (with delay_s)");
+                   fmt::format("YAML or JSON list of {{type, cameras, from, to}}; type: {} (with delay_s)",
+                               simulator::fault_names()));
   verb->add_option("--threads", a.threads, "number of threads; 0: one per core")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();

@@ -23,27 +23,27 @@ LiveRecord::LiveRecord(const dataset::Dataset& dataset, const system::Config& co
   for (std::size_t c = 0; c < record_.cameras.size(); ++c) record_.cameras[c].name = dataset.rig.camera(c).name;
 }
 
-void LiveRecord::add(FedFrame&& fed) {
-  session::RunFrame& frame = record_.frames.emplace_back(session::RunFrame{seconds(fed.time_ns), {}});
+void LiveRecord::add(InputFrame&& input) {
+  session::RunFrame& frame = record_.frames.emplace_back(session::RunFrame{seconds(input.time_ns), {}});
   record_.stages = {};
   std::swap(record_.stages, caller_stages_);
-  session::add_stage_sample(record_, "read", session::StageThread::kBackground, {frame.time_s, fed.read_ms});
-  if (fed.record) {
-    for (const tracking::StageTime& s : fed.record->stages)
+  session::add_stage_sample(record_, "read", session::StageThread::kBackground, {frame.time_s, input.read_ms});
+  if (input.record) {
+    for (const tracking::StageTime& s : input.record->stages)
       session::add_stage_sample(record_, s.stage, session::StageThread::kCaller, {frame.time_s, s.ms});
-    if (fed.record->relocalisation) {
+    if (input.record->relocalisation) {
       record_.relocalisations.push_back(
-          {frame.time_s, seconds(fed.relocalised_with_ns), fed.record->relocalisation->inliers});
+          {frame.time_s, seconds(input.relocalised_with_ns), input.record->relocalisation->inliers});
     }
-    if (fed.record->map_withdrawn) withdraw_map();
+    if (input.record->map_withdrawn) withdraw_map();
     for (std::size_t c = 0; c < record_.cameras.size(); ++c) {
-      const image::ImageState image = fed.record->images[c];
+      const image::ImageState image = input.record->images[c];
       record_.cameras[c].images += image == image::ImageState::kPresent;
       record_.cameras[c].skipped += image == image::ImageState::kDamaged;
     }
   }
   std::swap(record_.stages, caller_stages_);
-  frame.record = std::move(fed.record);
+  frame.record = std::move(input.record);
 }
 
 // Removes the poses of a wrong initialisation together with its map.

@@ -1,4 +1,4 @@
-// The data of the live view: a record like the final record of a run, which grows frame by frame.
+// The data of the live view: the session::RunRecord of a run in progress, extended with every frame.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -13,7 +13,7 @@
 namespace bslam::live_view {
 
 // An input frame of the run.
-struct FedFrame {
+struct InputFrame {
   TimeNs time_ns = 0;
   std::optional<tracking::FrameRecord> record;  // nullopt if it was dropped
   double read_ms = 0;
@@ -33,7 +33,7 @@ class LiveRecord {
   // the record.
   LiveRecord(const dataset::Dataset& dataset, const system::Config& config, std::size_t loaded_keyframes);
 
-  void add(FedFrame&& frame);
+  void add(InputFrame&& frame);
 
   // Returns the data of the page (session/report_data.h) for the current map. The cost is proportional to the number of
   // frames. Poses, frames and landmarks are subsampled to a few thousand.

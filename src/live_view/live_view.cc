@@ -21,7 +21,7 @@ enum class Phase { kFeeding, kFinishing, kEnded };
 
 // The data that the run passes to the view.
 struct Mailbox {
-  std::vector<FedFrame> frames;                         // all frames since the view last read them
+  std::vector<InputFrame> frames;                       // all frames since the view last read them
   std::shared_ptr<const session::ProcessedFrame> last;  // the newest processed frame
   std::optional<StageResults> results;
   Phase phase = Phase::kFeeding;
@@ -61,7 +61,7 @@ class LiveView::Content final : public web_server::Content {
 
   // ---- Called by the thread of the run
 
-  void add(FedFrame&& frame, std::shared_ptr<const session::ProcessedFrame> processed, const system::System* system) {
+  void add(InputFrame&& frame, std::shared_ptr<const session::ProcessedFrame> processed, const system::System* system) {
     std::optional<StageResults> results;
     if (system && results_wanted_.exchange(false))
       results = StageResults{system->stage_runs(), system->loops(), system->maps_started()};
@@ -125,7 +125,7 @@ class LiveView::Content final : public web_server::Content {
 
   // Takes what has come since the last call. The lock is only held while pointers are exchanged.
   void collect() {
-    std::vector<FedFrame> frames;
+    std::vector<InputFrame> frames;
     std::optional<StageResults> results;
     {
       const std::lock_guard lock(mutex_);
@@ -136,7 +136,7 @@ class LiveView::Content final : public web_server::Content {
       phase_ = mailbox_.phase;
       if (report_.empty()) report_.swap(mailbox_.report);
     }
-    for (FedFrame& frame : frames) record_.add(std::move(frame));
+    for (InputFrame& frame : frames) record_.add(std::move(frame));
     if (results) results_ = *std::move(results);
   }
 
@@ -195,10 +195,10 @@ const std::string& LiveView::url() const { return server_->url(); }
 bool LiveView::is_watched() const { return server_->is_watched(); }
 
 void LiveView::processed(session::ProcessedFrame&& frame, const system::System& system) {
-  FedFrame fed{frame.record.result.time_ns, frame.record, frame.read_ms, 0};
+  InputFrame input{frame.record.result.time_ns, frame.record, frame.read_ms, 0};
   if (frame.record.relocalisation)
-    fed.relocalised_with_ns = system.keyframe_time(frame.record.relocalisation->matched_keyframe);
-  content_->add(std::move(fed), std::make_shared<const session::ProcessedFrame>(std::move(frame)), &system);
+    input.relocalised_with_ns = system.keyframe_time(frame.record.relocalisation->matched_keyframe);
+  content_->add(std::move(input), std::make_shared<const session::ProcessedFrame>(std::move(frame)), &system);
 }
 
 void LiveView::dropped(TimeNs time_ns, double read_ms) { content_->add({time_ns, {}, read_ms, 0}, nullptr, nullptr); }

@@ -10,9 +10,6 @@
 namespace bslam::simulator {
 namespace {
 
-using simulator::Fault;
-using simulator::FaultType;
-
 constexpr std::size_t kMaxBytes = 1 << 20;
 
 // Wraps the list in a map with one key, since YamlMap reads maps.
@@ -45,8 +42,8 @@ Result<Fault> read_fault(const yaml::YamlMap& map, std::size_t num_cameras) {
   if (const Status s = map.allow_only({"type", "cameras", "from", "to", "delay_s"}); !s) return s.error();
   const auto name = map.text("type");
   if (!name) return name.error();
-  const auto type = simulator::fault_type(*name);
-  if (!type) return map.error("type", *name, "black, frozen, over_exposed, blurred, dropped or delayed");
+  const auto type = fault_type(*name);
+  if (!type) return map.error("type", *name, fault_names());
   Fault fault;
   fault.type = *type;
   if (const Status s = read_cameras(map, num_cameras, fault); !s) return s.error();
@@ -61,7 +58,7 @@ Result<Fault> read_fault(const yaml::YamlMap& map, std::size_t num_cameras) {
     const auto delay = map.number("delay_s");
     if (!delay) return delay.error();
     if (*type != FaultType::kDelayed)
-      return map.error("delay_s", fmt::format("a delay for type {}", *name), "a delay only for type delayed");
+      return map.error("delay_s", fmt::format("a delay for type {}", *name), "delay_s with type delayed only");
     if (!(*delay >= 0)) return map.error("delay_s", fmt::format("{}", *delay), "a non-negative number of seconds");
     fault.delay_s = *delay;
   }

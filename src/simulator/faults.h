@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -11,9 +12,9 @@ enum class FaultType {
   kBlack,        // images without any light
   kFrozen,       // the previous image is repeated with new time stamps
   kOverExposed,  // far too much light
+  kBlurred,      // out of focus, as behind a drop of water or a smeared lens
   kDropped,      // no images
   kDelayed,      // images show the world `delay_s` before their time stamps
-  kBlurred,      // out of focus, as behind a drop of water or a smeared lens
 };
 
 struct Fault {
@@ -23,8 +24,9 @@ struct Fault {
   double delay_s = 0.1;           // for kDelayed only
 };
 
-// Names in files: black, frozen, over_exposed, dropped, delayed, blurred.
+// The name of a type in files, and a list of all names: "black, frozen, ... or delayed".
 std::string_view fault_name(FaultType type);
+std::string fault_names();
 std::optional<FaultType> fault_type(std::string_view name);
 
 }  // namespace bslam::simulator
