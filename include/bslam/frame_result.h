@@ -52,8 +52,9 @@ struct CameraResult {
 
 struct StageTime {
   // Points to static storage: "pyramids"; "align": landmarks are aligned directly; "extract", "bundle", "track": with
-  // keypoints; "start": a map is started; "relocalise"; "results": waiting for results of other threads; "wait":
-  // waiting for space in their queues.
+  // keypoints; "keyframe": the frame becomes a keyframe; "start": a map is started; "correct rig": the calibration is
+  // corrected before a map is started; "relocalise"; "results": waiting for results of other threads; "wait": waiting
+  // for space in their queues.
   std::string_view stage;
   double ms = 0;  // wall time in the caller's thread
 };
@@ -69,21 +70,19 @@ struct FrameResult {
   // The pose in the map; identity unless tracking. The world frame is the frame of camera 0 at the start of the submap:
   // x right, y down, z forward, so that T_world_body begins with the pose of the body in camera 0; gravity is not
   // known. The pose jumps when a loop is closed. Poses of different submaps are unrelated; after submaps were merged,
-  // `submap` of later frames may differ for the same place. Camera 0 is the one that was calibrated: a refinement of
-  // the calibration may turn it in the body, so that T_world_cam0 then differs from that of MapView::Keyframe. The pose
-  // of a camera that belongs to MapView::rig() is T_world_body * rig().camera(i).T_body_cam.
+  // `submap` of later frames may differ for the same place. Camera 0 is RigFrame::kCamera0. Camera i of MapView::rig()
+  // has the pose T_world_body * rig().camera(i).T_body_cam.
   Pose T_world_cam0, T_world_body;
   // Scale of the map, which determines the unit of length of all poses and velocities. Valid if tracking.
   Scale scale = Scale::kMetric;
   int submap = -1;  // the submap of these poses: id of its first keyframe, its root
-  // Covariance of T_world_cam0, if known: of the small motion d, rotation first, in the axes of camera 0, with
-  // T_world_cam0(true) = T_world_cam0 exp(d). Relative to the first keyframe of the submap, or to a loaded map: image
-  // noise, the drift of the map and, if the calibration was estimated from the images, its remaining error, such as
-  // that of the scale of the baselines. A given calibration is taken as exact after the images of about eight keyframes
-  // have not contradicted it, or if calibration.refine is false; until then, the covariance contains the error that it
-  // may have. The standard deviations of the position of camera 0 along its own axes are the square roots of elements
-  // 21, 28 and 35. Nullopt in the first frame of a map. That of T_world_body in the axes of the body is A covariance
-  // A^T with the adjoint A of T_body_cam0.
+  // Covariance C of T_world_cam0, if known: that of the right perturbation d, rotation first, in T_world_cam0(true) =
+  // T_world_cam0 exp(d), in the axes of camera 0. It is relative to the root keyframe of the submap, or to a loaded
+  // map. It contains the noise of the images, the drift of the map and the error that may be left in the calibration. A
+  // given calibration counts as exact once the images of about eight keyframes have not contradicted it, or if
+  // calibration.refine is false. The variances of the position along the axes of camera 0 are elements 21, 28 and 35.
+  // The covariance of T_world_body in the axes of the body is Ad(T_body_cam0) C Ad(T_body_cam0)^T. Nullopt in the first
+  // frame of a map.
   std::optional<Covariance6> covariance;
   // Velocity of the body frame in its own axes, averaged since the previous frame; nullopt if that frame has no pose or
   // was more than half a second earlier.
@@ -103,12 +102,14 @@ struct FrameResult {
   bool keyframe = false;
   int keyframe_id = -1;      // its id if it became a keyframe, otherwise the reference keyframe; -1 if none
   bool relocalised = false;  // tracking was recovered by place recognition
-  // Two motions explain the images almost equally well, such as those of the scene and of people who fill the view. The
-  // pose may be relative to the wrong one if this is true for several frames within a second.
+  // A second motion, such as that of people who fill the view, has more than half of the support of the chosen one in
+  // the images of the same cameras. If this is true for several frames within a second, the pose may be relative to the
+  // moving objects.
   bool contested = false;
-  // The initial map was wrong: it was up to scale, and the rig was lost in it soon after, or the cameras that determine
-  // its scale contradicted it, or its poses were contested. All poses and keyframes reported so far are invalid, and
-  // the map is empty. A new one will be initialised; ids of keyframes are not used again.
+  // The initial map was wrong and was discarded: tracking was lost soon after a start without metric scale, the cameras
+  // that determine the scale contradicted the map, or its landmarks supported two motions. All poses and keyframes
+  // reported so far are invalid, and the map is empty. A new one will be initialised; ids of keyframes are not used
+  // again.
   bool map_withdrawn = false;
 
   std::vector<StageTime> stages;

@@ -28,9 +28,8 @@ class BSLAM_EXPORT MapView {
     int id = -1;               // unique within a run, also after removal
     std::int64_t time_ns = 0;  // time of its frame, by the clock of the recording
     // Pose of camera 0 of the rig that recorded it, in the world frame of its submap; metres if scale() is metric. It
-    // is the camera of rig(), by which landmarks project into the images. If the calibration was refined, camera 0 may
-    // be turned in the body by up to a degree or so, against the camera as it was calibrated, whose poses
-    // FrameResult::T_world_cam0 and trajectories contain. Poses of the body are the same in all of them.
+    // is the camera of rig(), by which landmarks project into the images. After a refinement of the calibration it may
+    // be rotated against RigFrame::kCamera0, to which FrameResult::T_world_cam0 and trajectories refer.
     Pose T_world_cam0;
     int parent = -1;    // id of its parent in the submap's spanning tree; -1 for the root
     int submap = -1;    // id of the root keyframe of its submap

@@ -25,7 +25,7 @@ enum class LogLevel { kInfo, kWarning };
 
 struct KeyframeEvent {
   int keyframe = -1;  // id in the map
-  FrameResult frame;  // result of its frame, which may be one before the last
+  FrameResult frame;  // result of the frame that became the keyframe; it may be older than the last processed frame
 };
 
 // A place was recognised and the map corrected.
@@ -98,8 +98,8 @@ class BSLAM_EXPORT System {
   Status finish();
 
   // Makes the current call and finish() return soon. Background work is stopped and its results are discarded from then
-  // on: process() continues to track and to add keyframes, but no landmarks are created between them, no loops are
-  // closed and nothing is adjusted.
+  // on: process() continues to track and to add keyframes, but no new landmarks are triangulated from several
+  // keyframes, no loops are closed and nothing is adjusted.
   void interrupt();
 
   // Returns the current version of the map.

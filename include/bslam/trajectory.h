@@ -20,8 +20,9 @@ struct TimedPose {
 // Poses with strictly increasing times.
 using Trajectory = std::vector<TimedPose>;
 
-// The frame of the rig to which a pose refers: camera 0, or the body frame of the calibration (often the IMU). Camera 0
-// is the one that was calibrated, as in FrameResult: a refinement of the calibration may turn it in the body.
+// The frame of the rig to which a pose refers: camera 0, or the body frame of the calibration (often the IMU). kCamera0
+// is camera 0 as it is in the given calibration. Refining the calibration may rotate camera 0 of MapView::rig() against
+// it, by up to about a degree. The body frame remains the same.
 enum class RigFrame { kCamera0, kBody };
 
 // Writes the TUM format: a comment with the frame, then one line `t x y z qx qy qz qw` per pose, in seconds and metres

@@ -109,7 +109,7 @@ void bind_frame(nb::module_& module) {
       .def_ro("keyframe", &Frame::keyframe, "Whether the frame became a keyframe.")
       .def_ro("keyframe_id", &Frame::keyframe_id, "Its id, otherwise that of the reference keyframe; -1 if none.")
       .def_ro("relocalised", &Frame::relocalised, "Whether tracking was recovered by place recognition.")
-      .def_ro("contested", &Frame::contested, "Two motions explain the images almost equally well.")
+      .def_ro("contested", &Frame::contested, "A second motion has more than half of the support of the chosen one.")
       .def_ro("map_withdrawn", &Frame::map_withdrawn, "The first map was wrong: all poses so far are invalid.")
       .def_prop_ro("stages", stages, "Wall time by stage, in milliseconds.")
       .def_ro("total_ms", &Frame::total_ms, "Wall time from the call to the pose, in milliseconds.")

@@ -1,5 +1,5 @@
 // The command `bslam` of the Python package: starts the program in the folder of the package, which finds its libraries
-// relative to itself. Written without the interpreter, so that it takes no time.
+// relative to itself. It is a native program, to avoid the start-up time of Python.
 #include <glob.h>
 #include <unistd.h>
 
@@ -14,7 +14,7 @@
 
 namespace {
 
-// The folder that contains the folder of this command, such as that of a virtual environment.
+// The installation prefix, such as the folder of a virtual environment: the parent of the directory of this executable.
 std::string prefix() {
   char path[PATH_MAX];
   const ssize_t length = readlink("/proc/self/exe", path, sizeof path);
@@ -37,7 +37,8 @@ std::string interpreter(const std::string& root) {
   return {};
 }
 
-// The name without links, such as python3.11, of which the folder of packages has the name as well.
+// Resolves symbolic links and returns the name of the file, such as python3.11. The site-packages directory of this
+// interpreter is inside a directory of the same name.
 std::string real_name(const std::string& file) {
   char path[PATH_MAX];
   const std::string out = realpath(file.c_str(), path) != nullptr ? path : "";
@@ -72,7 +73,8 @@ std::vector<std::string> programs(const std::string& root) {
 int main(int, char** argv) {
   const std::string root = prefix();
   const std::string python = interpreter(root), version = "/" + real_name(python) + "/";
-  // For --rerun. There is none beside commands that were installed with pip --user: python3 of PATH is used then.
+  // The program needs this interpreter for --rerun. After pip install --user there is no interpreter beside the
+  // command: the program then uses python3 from PATH.
   if (python.starts_with(root + "/bin/")) setenv("BSLAM_PYTHON", python.c_str(), 0);
   std::vector<std::string> found = programs(root);
   std::ranges::stable_partition(found, [&](const std::string& p) { return p.find(version) != std::string::npos; });

@@ -1,4 +1,4 @@
-// Lists in texts.
+// Splits texts at a separator.
 #pragma once
 
 #include <string>
@@ -7,7 +7,7 @@
 
 namespace bslam {
 
-// Returns the parts between separators, of which there is at least one; parts may be empty ("1,,2", "1,").
+// Returns the parts before, between and after the separators: one part without any. Parts may be empty ("1,,2", "1,").
 std::vector<std::string> split(std::string_view text, char separator);
 
 }  // namespace bslam

@@ -1,4 +1,5 @@
-// The scale of a map during an estimate of its calibration, measured by the lengths of the paths of its keyframes.
+// Keeps the scale of a map constant while its calibration is estimated, by the length of the trajectory of its
+// keyframes.
 #pragma once
 
 #include <vector>
@@ -13,11 +14,12 @@ double path_length(const RigProblem& problem);
 // of the problem and in the frame of the poses.
 double path_deviation(const RigProblem& problem, const std::vector<geometry::PoseUncertainty::Effect>& effects);
 
-// Scales the estimate so that the distances between the keyframes remain, if this changes the scale of the baselines by
-// less than `scale_tolerance_percent` or the standard deviation of the scale, which counts up to 5 %. Before the call,
-// the common scale of the baselines is exactly the calibrated one. Single baselines are uncertain at first, so that
-// without this function each estimate would change the scale of the live trajectory. The difference that was kept is
-// included in the standard deviation of the scale.
+// Rescales the rig, poses and landmarks of the estimate so that the length of the trajectory is that of before the
+// estimate. Does nothing if this would change the baselines by at least scale_tolerance_percent and by at least the
+// standard deviation of the scale, capped at 5 %. Before the call, the common scale of the baselines is exactly the
+// calibrated one. Single baselines are uncertain at first: without this function, every estimate would change the scale
+// of the live trajectory. The factor is recorded in kept_scale, from which apply() adds it to the uncertainty of the
+// calibration.
 void keep_scale(const CalibrationOptions& options, RigRefinement& refinement);
 
 }  // namespace bslam::calibration

@@ -197,7 +197,7 @@ void McapFile::add_record(std::uint32_t chunk, std::uint64_t at, const Record& r
   }
 }
 
-// Returns false if the chunk has an unknown compression or a damaged header.
+// Adds a chunk. Returns false if it has an unknown compression or a damaged header.
 bool McapFile::add_chunk_of(const Record& record) {
   finish_chunk();
   constexpr std::uint64_t kMostHeader = 256;
@@ -229,7 +229,7 @@ void McapFile::scan_chunk(std::uint32_t chunk) {
 
 // Adds the messages of one channel in the last chunk. Returns false if the record is damaged.
 bool McapFile::add_index(const Record& record) {
-  if (!has_open_chunk()) return true;  // the chunk was scanned
+  if (!has_open_chunk()) return true;  // the messages of the chunk were found by scanning it
   const std::string data = data_of(0, record);
   ByteReader in(data);
   const auto channel = in.number<std::uint16_t>();

@@ -13,7 +13,7 @@ constexpr std::size_t kMaxCoefficients = 1000;
 
 struct Field {
   std::uint32_t number = 0;
-  std::uint32_t wire = 0;   // 0 varint, 1 fixed 64 bits, 2 counted bytes, 5 fixed 32 bits
+  std::uint32_t wire = 0;   // 0 varint, 1 fixed 64 bits, 2 length-delimited bytes, 5 fixed 32 bits
   std::uint64_t value = 0;  // value of a fixed or varint field; number of bytes of a length-delimited field
   std::string_view bytes;   // bytes of a length-delimited field, as far as they are present
   std::uint64_t at = 0;     // offset of the bytes in the message

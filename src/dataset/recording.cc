@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The format of a folder with files that only one format has.
+// The format of a folder if it contains files by which one format is recognised without doubt.
 std::optional<DatasetFormat> distinct_format(const fs::path& folder) {
   if (looks_like_euroc(folder)) return DatasetFormat::kEuroc;
   if (looks_like_kitti(folder) || looks_like_kitti_raw(folder)) return DatasetFormat::kKitti;
@@ -43,7 +43,7 @@ std::vector<fs::path> folders_in(const fs::path& folder) {
   return out;
 }
 
-// Folders of recordings one or two levels below, relative to `folder`.
+// The folders one or two levels below `folder` that look like recordings, relative to it.
 std::vector<std::string> recordings_below(const fs::path& folder) {
   std::vector<std::string> out;
   for (const fs::path& outer : folders_in(folder)) {
@@ -78,7 +78,7 @@ Result<DatasetFormat> detect_format(const fs::path& folder) {
       "images for each camera (folder), or a ROS 2 bag (metadata.yaml)"};
 }
 
-// The files that are joined by commas, or the only one, whose name may contain commas.
+// Splits a list of files at its commas, unless there is a file with commas in its name.
 std::vector<fs::path> files_of(const fs::path& path) {
   std::error_code error;
   if (fs::exists(path, error)) return {path};

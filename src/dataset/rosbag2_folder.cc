@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kMaxMetadataBytes = std::size_t{1} << 24;
 
-// Names of files with numbers, such as bag_10.db3 after bag_9.db3.
+// Compares names of numbered files so that bag_9.db3 comes before bag_10.db3.
 bool natural_less(const fs::path& a, const fs::path& b) {
   const std::string x = a.filename().string(), y = b.filename().string();
   return x.size() != y.size() ? x.size() < y.size() : x < y;

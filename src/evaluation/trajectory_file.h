@@ -23,11 +23,11 @@ enum class TrajectoryFormat { kTum, kEurocCsv, kKitti };
 // folder of `file`; other formats ignore it. The Error names the file and line: unreadable file, no poses, wrong number
 // of fields, a value that is not a finite number, an invalid rotation, times that do not increase, different numbers of
 // times and poses.
-Result<evaluation::Trajectory> read_trajectory(const std::filesystem::path& file,
-                                               const std::optional<std::filesystem::path>& times = {});
+Result<Trajectory> read_trajectory(const std::filesystem::path& file,
+                                   const std::optional<std::filesystem::path>& times = {});
 
-// The file with the times of a trajectory, which read_trajectory reads as well; nullopt if its format is not KITTI's,
-// or if it cannot be read.
+// The path of the times file that read_trajectory would read for these KITTI poses. Returns nullopt if the file of the
+// poses cannot be read or is not in KITTI format. The times file need not exist.
 std::optional<std::filesystem::path> times_of_poses(const std::filesystem::path& file,
                                                     const std::optional<std::filesystem::path>& times = {});
 
@@ -37,18 +37,18 @@ std::optional<TimeNs> parse_seconds(std::string_view text);
 
 // Returns the content of a trajectory file. TUM begins with "# HEADER" if `header` is not empty. Seconds, metres and
 // quaternions have nine decimals. KITTI contains poses only; `times_text` gives the matching times file.
-std::string tum_text(const evaluation::Trajectory& trajectory, std::string_view header);
-std::string euroc_csv_text(const evaluation::Trajectory& trajectory);
-std::string kitti_text(const evaluation::Trajectory& trajectory);
-std::string times_text(const evaluation::Trajectory& trajectory);
+std::string tum_text(const Trajectory& trajectory, std::string_view header);
+std::string euroc_csv_text(const Trajectory& trajectory);
+std::string kitti_text(const Trajectory& trajectory);
+std::string times_text(const Trajectory& trajectory);
 
-// The name of the times that write_trajectory writes for KITTI poses.
+// The path of the times file that write_trajectory writes for KITTI poses: times.txt in the same folder.
 std::filesystem::path times_beside(const std::filesystem::path& poses);
 
 // Writes a trajectory atomically. KITTI then also writes times.txt into the same folder. `header` is used by TUM only.
 // Errors: a file cannot be written; times.txt exists, which may be that of a recording, unless `replace_times`;
-// times.txt is the name of the poses themselves. Nothing is written after the last two.
-Status write_trajectory(const std::filesystem::path& file, const evaluation::Trajectory& trajectory,
-                        TrajectoryFormat format, std::string_view header = {}, bool replace_times = false);
+// times.txt is the name of the poses themselves. In the last two cases nothing is written.
+Status write_trajectory(const std::filesystem::path& file, const Trajectory& trajectory, TrajectoryFormat format,
+                        std::string_view header = {}, bool replace_times = false);
 
 }  // namespace bslam::evaluation

@@ -8,7 +8,8 @@
 namespace bslam::looping {
 namespace {
 
-constexpr int kAway = 10;  // successive keyframes without sight of a place after which seeing it again is a return
+// Minimum number of successive keyframes that do not see a place, after which seeing it again is a return.
+constexpr int kAway = 10;
 // A place is in sight of a keyframe that shares at least this fraction of the landmarks that the returning keyframe
 // shares with it. In a wide room, cameras all around observe some of a place from everywhere.
 constexpr double kInSight = 0.25;
@@ -20,8 +21,8 @@ double distance(const map::BundledMap& map, KeyframeId a, KeyframeId b) {
   return (centre(a) - centre(b)).norm();
 }
 
-// Whether kAway successive keyframes between the two have lost sight of the place of the earlier one, of which the
-// later one observes `weight` landmarks.
+// Whether there are kAway successive keyframes between the two that do not see the place of the earlier one. The later
+// one shares `weight` landmarks with the earlier one.
 bool was_away(const map::BundledMap& map, KeyframeId earlier, KeyframeId later, int weight,
               const RecognitionOptions& options) {
   auto neighbours = neighbours_of(map, earlier, options);

@@ -84,7 +84,8 @@ class BundledMap {
   Scale scale() const { return scale_; }
   // Relative standard deviation of the map scale: 0 if overlapping cameras observe it, infinite if nothing is known.
   double scale_deviation() const { return scale_deviation_; }
-  // Number of corrections (loop closures, global adjustments) so far. Positions of different epochs must not be mixed.
+  // Number of corrections so far: loop closures, global adjustments and changes of the scale of a submap. Positions of
+  // different epochs must not be mixed.
   int gauge_epoch() const { return gauge_epoch_; }
 
   // Slots include removed keyframes and landmarks. Ids are slot numbers and are never reused.
@@ -113,7 +114,7 @@ class BundledMap {
   // Roots of all submaps in ascending order, and the root of the submap of an alive keyframe.
   std::vector<KeyframeId> roots() const;
   KeyframeId root_of(KeyframeId k) const;
-  // The root of each keyframe slot. Takes as long as root_of() for a few keyframes of a long path.
+  // The root of each keyframe slot. Costs one pass over all slots: for many keyframes it is faster than root_of().
   std::vector<KeyframeId> root_of_each() const;
   // Alive keyframes of the submap with this root, parents before children.
   std::vector<KeyframeId> keyframes_of_submap(KeyframeId root) const;
@@ -191,15 +192,16 @@ class BundledMap {
   // Also returns false if the keyframe already observes the landmark or the feature already has one.
   bool add_observation(LandmarkId l, Observation o);
   // Removing the last observation removes the landmark. If the reference is removed, the first keypoint of the oldest
-  // remaining observation that has a patch becomes the reference. Also returns false if the keyframe does not observe
-  // the landmark.
+  // remaining observation that has a patch becomes the reference, or that of the oldest observation if none has a
+  // patch. Also returns false if the keyframe does not observe the landmark.
   bool remove_observation(LandmarkId l, KeyframeId k);
   bool remove_landmark(LandmarkId l);
   // Merges `from` into `into`: observations are moved unless the keyframe already observes `into`, and visibility
   // counts are added. Also returns false if both are the same landmark.
   bool merge_landmarks(LandmarkId from, LandmarkId into);
-  // Removes the keyframe and its observations. Its children are attached to their best covisible keyframe that keeps
-  // the spanning tree acyclic. Also returns false for a root.
+  // Removes the keyframe and its observations. Each of its children is attached to the parent of the removed keyframe
+  // or to a sibling that has been attached already, whichever shares most landmarks with it. Also returns false for a
+  // root.
   bool remove_keyframe(KeyframeId k);
   // Joins two submaps: `child` becomes the root of its submap and is attached to `parent`. Also returns false if both
   // are in the same submap.
@@ -238,9 +240,10 @@ class BundledMap {
   void release_pages() const;
   void set_file(std::shared_ptr<const MappedFile> file) { file_ = std::move(file); }
 
-  // ---- In fill_map.cc Fills an empty map. The viewing direction, distances and descriptor of the landmarks are taken
-  // as they are. Returns a description of the first problem in the parts, after which the map must not be used, or
-  // nullopt; then all invariants hold.
+  // ---- In fill_map.cc
+  // Fills an empty map. The viewing direction, distances and descriptor of the landmarks are taken as they are. Returns
+  // a description of the first problem in the parts, after which the map must not be used, or nullopt; then all
+  // invariants hold.
   std::optional<PartsError> fill(const MapParts& parts, ThreadPool& pool);
 
  private:
@@ -258,6 +261,8 @@ class BundledMap {
   void unlink(LandmarkId l, Observation o);
   void mark_removed(KeyframeId k);                          // must have no observations or children left
   void mark_removed(LandmarkId l, LandmarkId merged_into);  // must have no observations left
+
+  // In release_memory.cc.
   LandmarkReference reference_among(std::span<const Observation> observations) const;
   void release_unused(KeyframeId k);
 

@@ -1,6 +1,6 @@
 // Sub-pixel alignment of a keypoint to a reference patch: finds the position in this image that shows the same surface
-// as the reference keypoint. Removes the 0.3 - 1 px localisation noise of a detector, which otherwise limits the
-// accuracy of stereo depth and of the scale.
+// as the reference keypoint. Reduces the 0.3 - 1 px localisation noise of the detector, which would otherwise limit the
+// accuracy of stereo depth and of the scale, to about 0.1 px.
 #pragma once
 
 #include <Eigen/Core>
@@ -20,7 +20,7 @@ struct AlignmentOptions {
   int iterations = 10;        // maximum number of inverse-compositional steps
   double max_shift_px = 2.0;  // px of the level, maximum distance from the initial position; farther is another corner
   double min_ncc = 0.8;       // minimum normalised cross-correlation after alignment
-  // px of the level, minimum standard deviation of an aligned keypoint: errors of interpolation and warp
+  // px of the level, lower bound of the standard deviation; covers errors of interpolation and of the warp
   double min_sigma_px = 0.12;
   // Level-0 pixels, added in quadrature: initial value of the calibration error, and the bounds between which tracking
   // estimates it (tracking/calibration_error.h).
@@ -73,7 +73,7 @@ std::optional<PatchWarp> patch_warp(const camera::Camera& reference_camera, cons
 
 struct AlignedKeypoint {
   Eigen::Vector2d pixel;  // level-0 pixels of the target image
-  double sigma = 0;       // level-0 pixels per axis, in the direction of the largest standard deviation
+  double sigma = 0;       // level-0 pixels, standard deviation in the least certain direction
 };
 
 // Aligns `patch` in `target` by inverse-compositional Lucas-Kanade steps for translation with gain and offset (Baker

@@ -13,8 +13,8 @@ camera::Rig default_rig();
 // a baseline of 0.11 m, the others evenly distributed over the remaining directions.
 camera::Rig ring_rig(int n, int width = 752);
 
-// `n` (1 to 8) Kannala-Brandt fisheye cameras of 190 degrees and `width` x `width` pixels, evenly distributed around
-// the body.
+// `n` (1 to 8) Kannala-Brandt fisheye cameras with a field of view of 190 degrees and `width` x `width` pixels, evenly
+// distributed around the body.
 camera::Rig fisheye_rig(int n, int width = 640);
 
 // Two pinhole cameras in front and a fisheye on each side.

@@ -9,9 +9,9 @@ using geometry::SE3;
 using geometry::Vector6d;
 using tracking::FrameRecord;
 
-// Mean twist from the time of frame `at` of three, the first or the middle one, to `delay` after it, for constant
-// acceleration through the three poses: the mean twist of an interval is the twist at its middle, and the result is the
-// twist at half the delay.
+// Mean twist between the time t of frames[at], `at` being 0 or 1, and t + delay_s, assuming constant acceleration. The
+// mean twists of the two intervals between the frames are taken as the twists at the middles of these intervals, and
+// are extrapolated linearly to t + delay_s / 2.
 std::optional<Vector6d> twist_through(std::span<const FrameRecord, 3> frames, std::size_t at,
                                       const map::BundledMap& map, double delay_s) {
   const double before_s = to_seconds(frames[1].result.time_ns - frames[0].result.time_ns);

@@ -28,7 +28,8 @@ struct TrackedFrame {
 // The output for a frame with a pose. The states of its cameras and the decision on a keyframe are left to the caller.
 TrackOutput output_of(const TrackInput& input, TrackedFrame found);
 
-// Updates the state of a camera that is used for the next frame; `inliers`: those of the camera.
+// Updates the state of a camera that is not excluded, such as the time of its last image and the landmarks that it
+// observes. `inliers`: the inliers of this camera.
 void update_used_camera(const frame::BundledFrame& frame, std::size_t c, const std::vector<Match>& inliers,
                         const ConsensusOptions& options, CameraConsensusState& camera);
 

@@ -7,7 +7,7 @@
 
 namespace bslam::web_server {
 
-// 32 random hexadecimal digits, of the random source of the operating system.
+// 32 hexadecimal digits from the operating system's random number generator.
 std::string make_token();
 
 // The request line and headers of a request. Missing headers are empty.

@@ -36,7 +36,8 @@ def _hashes(words: NDArray[np.int32]) -> NDArray[np.uint32]:
 def likely_pairs(sketches: Sequence[Sketch], partners: int) -> list[tuple[int, int]]:
     """The pairs of maps to compare, the most similar ones first: each map with about `partners` others.
 
-    The result depends on the order of the sketches only where similarities are equal.
+    The result depends on the order of the sketches if similarities are equal, or if more than `partners` + 1 maps share
+    a bucket.
     """
     if not sketches:
         return []
@@ -49,7 +50,7 @@ def likely_pairs(sketches: Sequence[Sketch], partners: int) -> list[tuple[int, i
             if not members or members[-1] != i:  # owners ascend
                 members.append(i)
         for members in buckets.values():
-            for n, i in enumerate(members):  # bounded, for places that most recordings have seen
+            for n, i in enumerate(members):  # bounds the number of pairs if most maps share a bucket
                 common.update((i, j) for j in members[n + 1 : n + 1 + partners])
     size = [max(1, len(s)) for s in sketches]
     ranked = sorted(common, key=lambda p: (-common[p] / min(size[p[0]], size[p[1]]), p))
