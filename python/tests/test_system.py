@@ -15,13 +15,13 @@ def system(recording):
     return bslam.System(bslam.Rig.load(recording.folder), mode="sequential")
 
 
-def test_trajectory_has_the_bytes_of_the_program(finished, program_run, tmp_path):
+def test_trajectory_equals_that_of_bslam_run_byte_for_byte(finished, program_run, tmp_path):
     finished[0].save_trajectory(tmp_path / "t.tum")
     assert (tmp_path / "t.tum").read_bytes() == (program_run / "run/trajectory.tum").read_bytes()
     np.testing.assert_allclose(finished[0].trajectory(), np.loadtxt(tmp_path / "t.tum"), atol=1e-9, rtol=0)
 
 
-def test_settings_and_seed_have_the_effect_of_the_program(recording, program, tmp_path):
+def test_settings_and_seed_give_the_result_of_bslam_run(recording, program, tmp_path):
     system, _ = recording.run(settings={"features.per_image": 300, "tracking.frontend": "features"}, seed=3)
     system.save_trajectory(tmp_path / "t.tum")
     options = ["--set=features.per_image=300", "--set=tracking.frontend=features", "--seed=3", "--mode=sequential"]
@@ -52,7 +52,7 @@ def test_frame_without_pose_has_none(system, recording):
     assert frame.reason and [c.keypoints for c in frame.cameras] == [0, 0]
 
 
-def test_rows_may_be_apart_and_arrays_read_only(recording, finished):
+def test_accepts_strided_rows_and_read_only_arrays(recording, finished):
     system = bslam.System(bslam.Rig.load(recording.folder), "sequential")
     height, width = recording.images[0][0].shape
     wide = np.full((height, width + 40), 99, np.uint8)
@@ -67,7 +67,7 @@ def test_rows_may_be_apart_and_arrays_read_only(recording, finished):
 
 def test_images_are_not_copied(system, recording):
     system.process(recording.stamps[0], recording.images[0])
-    peaks = []  # a copy would be in each of them, allocations of another thread of the interpreter are not
+    peaks = []  # A copy would appear in every peak. The minimum excludes allocations of other threads.
     tracemalloc.start()
     for i in range(1, min(20, len(recording.stamps))):
         tracemalloc.reset_peak()
@@ -84,7 +84,7 @@ def test_masked_images_have_no_keypoints_there(system, recording):
     assert frame.cameras[0].keypoints == 0 < frame.cameras[1].keypoints
 
 
-WRONG = [
+INVALID_INPUTS = [
     ([1.5, 1], None, "stamps[0]: found float 1.5, expected an integer number of nanoseconds"),
     (1.5, None, "stamps: found float, expected an integer number of nanoseconds, or a list of them"),
     ([1], None, "stamps: found 1, expected 2, one for each image"),
@@ -109,7 +109,7 @@ def test_stamps_may_be_numbers_of_numpy(system, recording, kind):
     assert system.process(kind(stamps), recording.images[0]).time_ns == stamps[0]
 
 
-@pytest.mark.parametrize(("stamps", "images", "text"), WRONG)
+@pytest.mark.parametrize(("stamps", "images", "text"), INVALID_INPUTS)
 def test_wrong_input_is_an_error_in_one_line(system, recording, stamps, images, text):
     with pytest.raises(bslam.Error) as error:
         system.process(stamps, images or recording.images[0])
@@ -129,7 +129,7 @@ def test_wrong_settings_are_errors(recording):
 
 
 def test_other_threads_run_during_process(system, recording):
-    # No thread is interrupted: the other one runs only if this one releases the interpreter.
+    # The switch interval is longer than the test, so the other thread runs only if process() releases the GIL.
     interval, begin, ran = sys.getswitchinterval(), threading.Event(), []
     thread = threading.Thread(target=lambda: (begin.wait(), ran.append(True)))
     thread.start()
@@ -146,7 +146,7 @@ def test_other_threads_run_during_process(system, recording):
         thread.join()
 
 
-def test_concurrent_call_is_an_error(recording):
+def test_calling_the_system_from_a_callback_is_an_error(recording):
     calls = []
     system = bslam.System(
         bslam.Rig.load(recording.folder), "sequential", on_keyframe=lambda event: calls.append(call_again())
@@ -171,7 +171,7 @@ def test_events_are_reported(recording):
     assert {level for level, _ in lines} <= {"info", "warning"} and all("\n" not in line for _, line in lines)
 
 
-def test_exception_of_a_function_is_raised(recording):
+def test_exception_in_a_callback_is_raised(recording):
     def fail(event):
         raise KeyError("mine")
 
@@ -181,7 +181,7 @@ def test_exception_of_a_function_is_raised(recording):
     system.process(recording.stamps[1], recording.images[1])
 
 
-def test_system_in_a_circle_of_references_is_released(recording):
+def test_system_in_a_reference_cycle_is_garbage_collected(recording):
     class Owner:
         def __init__(self):
             self.system = bslam.System(bslam.Rig.load(recording.folder), on_keyframe=self.seen)
@@ -208,6 +208,7 @@ def test_references_to_images_end_with_the_call(system, recording):
 
 
 def test_nothing_leaks_at_exit(recording):
+    # Leaked objects of the bindings would be reported on stderr.
     code = f"""
 import bslam, numpy as np
 rig = bslam.Rig.load({str(recording.folder)!r})

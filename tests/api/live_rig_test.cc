@@ -29,9 +29,9 @@ namespace {
 using testing::TexturedWall;
 
 constexpr std::size_t kCameras = 3;
-constexpr int kTurn = 120;                                       // frames until the rig moves back
-constexpr std::int64_t kLate = TexturedWall::kInterval / 2;      // ns by which camera 2 captures later than the others
-constexpr double kMetresPerFrame = TexturedWall::kSpeed * 0.05;  // of camera 0
+constexpr int kTurn = 120;                                      // frames until the rig moves back
+constexpr std::int64_t kLate = TexturedWall::kInterval_ns / 2;  // ns by which camera 2 captures later than the others
+constexpr double kMetresPerFrame = TexturedWall::kStep * TexturedWall::kMetresPerPixel;  // of camera 0
 
 // Times are in frames: camera 2 captures at half frames.
 double position(double frame) {
@@ -52,7 +52,7 @@ CameraImage captured(const TexturedWall& wall, std::size_t camera, int k) {
   CameraImage image = wall.image(0, static_cast<int>(camera));
   const bool late = camera == 2;
   image.data += static_cast<std::ptrdiff_t>(TexturedWall::kStep * position(late ? k + 0.5 : k));
-  image.time_ns += k * TexturedWall::kInterval + (late ? kLate : 0);
+  image.time_ns += k * TexturedWall::kInterval_ns + (late ? kLate : 0);
   return image;
 }
 
@@ -195,8 +195,8 @@ class Session {
     for (std::size_t c = 0; c < kCameras; ++c) {
       const CameraImage& image = bundle.images[c];
       if (image.data == nullptr) continue;
-      const std::int64_t since = image.time_ns - TexturedWall::kStart - (c == 2 ? kLate : 0);
-      const int k = static_cast<int>(since / TexturedWall::kInterval);
+      const std::int64_t since = image.time_ns - TexturedWall::kStart_ns - (c == 2 ? kLate : 0);
+      const int k = static_cast<int>(since / TexturedWall::kInterval_ns);
       if (frame < 0) frame = k;
       EXPECT_EQ(k, frame) << "camera " << c << " has an image of another frame";
       EXPECT_TRUE(same_pixels(image, captured(wall_, c, k))) << "camera " << c << ", frame " << k;
@@ -215,7 +215,7 @@ class Session {
   // The images of the next frame would move the rig by 4 cm.
   void check_pose(const FrameResult& result) {
     ++tracked_;
-    const double frame = static_cast<double>(result.time_ns - TexturedWall::kStart) / TexturedWall::kInterval;
+    const double frame = static_cast<double>(result.time_ns - TexturedWall::kStart_ns) / TexturedWall::kInterval_ns;
     const double from_start = result.T_world_cam0.translation[0] - kMetresPerFrame * position(frame);
     const double start = start_.try_emplace(result.submap, from_start).first->second;
     EXPECT_NEAR(from_start, start, 0.03) << "frame " << frame << ", submap " << result.submap;

@@ -56,7 +56,7 @@ TEST_F(PublicSystem, ReportsPoseAndVelocityInTheDocumentedFrames) {
   ASSERT_TRUE(last.tracking());
   EXPECT_EQ(last.frame, kFrames - 1);
   EXPECT_EQ(last.scale, Scale::kMetric);
-  EXPECT_EQ(last.time_ns, TexturedWall::kStart + (kFrames - 1) * TexturedWall::kInterval);
+  EXPECT_EQ(last.time_ns, TexturedWall::kStart_ns + (kFrames - 1) * TexturedWall::kInterval_ns);
   const double travelled = TexturedWall::kSpeed * 0.05 * (kFrames - 1);
   EXPECT_NEAR(last.T_world_cam0.translation[0], travelled, 0.05);
   EXPECT_NEAR(last.T_world_cam0.translation[1], 0, 0.05);

@@ -17,10 +17,9 @@ class TexturedWall {
   static constexpr int kWidth = 320, kHeight = 240;
   static constexpr double kFocal = 200, kDepth = 4, kBaseline = 0.2;  // px, m, m
   static constexpr double kMetresPerPixel = kDepth / kFocal;
-  static constexpr int kStep = 2;                                   // px, image motion from frame to frame
-  static constexpr std::int64_t kInterval = 50'000'000;             // ns
-  static constexpr std::int64_t kStart = 1'000'000'000;             // ns
-  static constexpr double kSpeed = kStep * kMetresPerPixel / 0.05;  // m/s, along +x of camera 0
+  static constexpr int kStep = 2;  // px, image motion from frame to frame
+  static constexpr std::int64_t kInterval_ns = 50'000'000, kStart_ns = 1'000'000'000;
+  static constexpr double kSpeed = kStep * kMetresPerPixel / (1e-9 * kInterval_ns);  // m/s, along +x of camera 0
 
   TexturedWall() : texture_(static_cast<std::size_t>(kTextureWidth) * kHeight) {
     constexpr int kSquare = 7;
@@ -51,7 +50,7 @@ class TexturedWall {
   // Returns the image of a camera in frame k; it refers to rows of the texture, whose stride exceeds the image width.
   CameraImage image(int k, int camera) const {
     const int shift = kStep * k + static_cast<int>(kBaseline * camera / kMetresPerPixel + 0.5);
-    return {texture_.data() + shift, kWidth, kHeight, kTextureWidth, kStart + k * kInterval, nullptr};
+    return {texture_.data() + shift, kWidth, kHeight, kTextureWidth, kStart_ns + k * kInterval_ns, nullptr};
   }
   ImageBundle bundle(int k) const { return {{image(k, 0), image(k, 1)}}; }
 

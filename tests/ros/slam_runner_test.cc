@@ -106,7 +106,7 @@ TEST_F(RosRunner, PublishesPosesPointsPathAndTrajectory) {
   ASSERT_TRUE(stopped) << stopped.error().message();
   ASSERT_EQ(published_.poses.size(), std::size_t{kFrames});
   const PoseOutput& last = published_.poses.back();
-  EXPECT_EQ(last.time_ns, TexturedWall::kStart + (kFrames - 1) * TexturedWall::kInterval);
+  EXPECT_EQ(last.time_ns, TexturedWall::kStart_ns + (kFrames - 1) * TexturedWall::kInterval_ns);
   const double travelled = TexturedWall::kSpeed * 0.05 * (kFrames - 1);
   EXPECT_NEAR(last.T_map_base.translation[1], -travelled, 0.05);
   EXPECT_NEAR(last.velocity.linear[1], -TexturedWall::kSpeed, 0.1);
@@ -118,7 +118,8 @@ TEST_F(RosRunner, PublishesPosesPointsPathAndTrajectory) {
   EXPECT_GT(published_.paths.back().poses.size(), 10u);
   EXPECT_NEAR(
       published_.paths.back().poses.back().second.translation[1],
-      -TexturedWall::kSpeed * 1e-9 * static_cast<double>(published_.paths.back().time_ns - TexturedWall::kStart), 0.05);
+      -TexturedWall::kSpeed * 1e-9 * static_cast<double>(published_.paths.back().time_ns - TexturedWall::kStart_ns),
+      0.05);
   const auto statuses = runner->diagnostics();
   EXPECT_EQ(value(statuses, 0, "frames"), std::to_string(kFrames));
   EXPECT_EQ(value(statuses, 1, "images"), std::to_string(kFrames));
@@ -166,7 +167,7 @@ TEST_F(RosRunner, ContinuesInALoadedMapWithTheSameOdometry) {
   ASSERT_GT(published_.poses.size(), kFrames + 10u);
   for (std::size_t i = 1; i < published_.poses.size(); ++i) {
     const PoseOutput& pose = published_.poses[i];
-    const double y = -TexturedWall::kSpeed * 1e-9 * static_cast<double>(pose.time_ns - TexturedWall::kStart);
+    const double y = -TexturedWall::kSpeed * 1e-9 * static_cast<double>(pose.time_ns - TexturedWall::kStart_ns);
     EXPECT_NEAR(pose.T_map_base.translation[1], y, 0.06) << i;  // the same map frame
     const double step = pose.T_odom_base.translation[1] - published_.poses[i - 1].T_odom_base.translation[1];
     EXPECT_LT(std::abs(step), 0.1) << i;

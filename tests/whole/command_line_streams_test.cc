@@ -1,4 +1,5 @@
-// The command-line program: outputs that cannot be written, and streams and signals as another program may leave them.
+// The command-line program: outputs that cannot be written, closed standard streams, and SIGCHLD ignored by the parent
+// process.
 #include "whole/command_line.h"
 
 namespace bslam {
@@ -28,7 +29,7 @@ TEST_F(CommandLine, MessagesThatCannotBePrintedDoNotEndARun) {
   }
 }
 
-TEST_F(CommandLine, ResultsThatCannotBePrintedAreAnError) {
+TEST_F(CommandLine, AFullOutputDeviceIsAnErrorButAClosedStdoutIsNot) {
   const std::string truth = data() + "/groundtruth_cam0.tum", errors = " 2>" + out("stderr");
   for (const std::string& command :
        {"rig info " + data(), "eval " + truth + " " + truth, std::string("--version"), std::string("settings")}) {
@@ -37,13 +38,14 @@ TEST_F(CommandLine, ResultsThatCannotBePrintedAreAnError) {
     EXPECT_TRUE(error.starts_with("bslam: stdout: found ")) << command << ": " << error;
     EXPECT_TRUE(error.ends_with(", expected an output that can be written\n")) << command << ": " << error;
     EXPECT_EQ(std::ranges::count(error, '\n'), 1) << command << ": " << error;
+    // A closed stdout is opened as /dev/null (cli/standard_streams.h).
     EXPECT_EQ(status_of(command + " >&-" + errors), 0) << command;
     EXPECT_EQ(read_text(out("stderr")), "") << command;
   }
 }
 
-// Without a shell, which would restore the signal.
-TEST_F(CommandLine, AFailureOfAnotherProgramIsSeenAlsoIfSignalsOfChildrenAreIgnored) {
+// Calls fork and exec directly, since a shell would reset SIGCHLD.
+TEST_F(CommandLine, ReportsAFailedChildProcessEvenIfSigchldIsIgnored) {
   const std::string file = out("children.rrd"), folder = out("children"), errors = out("stderr");
   const pid_t child = ::fork();
   if (child == 0) {
