@@ -236,10 +236,30 @@ Result<SavedMap> open_map(const std::filesystem::path& file, const camera::Rig& 
   return saved;
 }
 
+namespace {
+
+// Whether any camera is apart from the origin of the rig frame, so that the unit of its calibration, the metre,
+// matters.
+bool has_distances(const camera::Rig& rig) {
+  constexpr double kRounding_m = 1e-6;
+  for (std::size_t c = 0; c < rig.size(); ++c) {
+    if (rig.rig_from_cam(c).translation().norm() > kRounding_m) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
 Status check_continued(const SavedMap& saved, const camera::Rig& rig, const feature::PyramidShape& pyramid,
                        const place::Vocabulary* vocabulary) {
   if (const Status status = fits(saved, pyramid, vocabulary); !status) return status;
-  const std::size_t cameras = saved.map.rig().size() + (map::find_rig(saved.map, rig) ? 0 : rig.size());
+  const bool known = map::find_rig(saved.map, rig).has_value();
+  const map::Scale scale = saved.map.scale();  // a single camera has made the map if it is only up to scale
+  if ((scale == map::Scale::kUpToScale || (scale == map::Scale::kUnobservable && !known)) && has_distances(rig)) {
+    return Error{saved.file, "scale", "a map whose lengths are not in metres",
+                 "a single camera, or a metric map, since the distances between the cameras of this rig are in metres"};
+  }
+  const std::size_t cameras = saved.map.rig().size() + (known ? 0 : rig.size());
   if (cameras > kMaxCameras) {
     return Error{saved.file, "rig", fmt::format("{} cameras with those of this run", cameras),
                  fmt::format("at most {}; a map with fewer rigs", kMaxCameras)};

@@ -46,7 +46,8 @@ Result<SavedMap> read_map(const std::filesystem::path& file);
 Status fits(const SavedMap& saved, const feature::PyramidShape& pyramid, const place::Vocabulary* vocabulary);
 
 // Checks that a run with this rig, which may be any rig, can continue the map. Errors: as for fits; the map has no
-// keyframes; it would have too many cameras with those of the run.
+// keyframes; it would have too many cameras with those of the run; its scale is not metric, and it was not made by the
+// cameras of the run, whose distances are in metres.
 Status check_continued(const SavedMap& saved, const camera::Rig& rig, const feature::PyramidShape& pyramid,
                        const place::Vocabulary* vocabulary);
 

@@ -379,6 +379,29 @@ TEST(MapFile, ACameraIsNotAnotherOneOfTheSameCalibration) {
   EXPECT_FALSE(map::find_rig(map, stereo.subset(std::vector<int>{1})));
 }
 
+// Distances between cameras are in metres, and mean nothing in a map with a unit of its own.
+TEST(MapFile, OfAnotherScaleIsContinuedByItsOwnRigOrCamerasInOnePlaceOnly) {
+  const camera::Rig rig = synthetic::ring_rig(2), other = synthetic::fisheye_rig(2);
+  const auto alone = [](const camera::Rig& whole, int c) { return whole.subset(std::vector<int>{c}); };
+  std::vector<camera::RigCamera> turned;
+  for (std::size_t c = 0; c < rig.size(); ++c)
+    turned.push_back({other.camera(c), geometry::SE3(rig.body_from_cam(c).rotation(), Eigen::Vector3d(1, 2, 3))});
+  map::BundledMap map = small_map(rig);
+  const auto checked = [&map](const camera::Rig& r) {
+    return check_continued(read_back(map), r, map.pyramid(), nullptr);
+  };
+  for (const map::Scale scale : {map::Scale::kUpToScale, map::Scale::kUnobservable}) {
+    map.set_scale(scale);
+    ASSERT_FALSE(checked(other));
+    EXPECT_EQ(checked(other).error().key, "scale");
+    EXPECT_EQ(bool(checked(rig)), scale == map::Scale::kUnobservable);  // one camera made the map that is up to scale
+    EXPECT_TRUE(checked(camera::Rig(turned)));
+    for (const int c : {0, 1}) EXPECT_TRUE(checked(alone(rig, c)) && checked(alone(other, c))) << c;
+  }
+  map.set_scale(map::Scale::kMetric);
+  EXPECT_TRUE(checked(other));
+}
+
 TEST(MapFile, KeepsTheRigFrameOfARefinedCalibration) {
   const camera::Rig rig = synthetic::ring_rig(2);
   map::BundledMap map = small_map(rig);
