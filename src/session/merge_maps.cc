@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <tuple>
+#include <unordered_map>
 #include <utility>
 
 #include "base/assert.h"
@@ -13,6 +14,7 @@
 #include "map/append_map.h"
 #include "map/map_store.h"
 #include "mapping/map_keyframe.h"
+#include "session/keyframe_identity.h"
 #include "storage/map_sections.h"
 
 namespace bslam::session {
@@ -31,6 +33,25 @@ bool before(const SavedMap& a, const SavedMap& b) {
   return std::tuple(b.map.num_keyframes(), a.checksums) < std::tuple(a.map.num_keyframes(), b.checksums);
 }
 
+// Checks that no keyframe is in two maps.
+Status check_keyframes(const std::vector<SavedMap>& maps) {
+  std::unordered_map<std::uint64_t, std::size_t> map_of;
+  for (std::size_t i = 0; i < maps.size(); ++i) {
+    std::vector<std::size_t> shared(i);  // with each earlier map
+    for (const KeyframeId k : maps[i].map.keyframe_ids()) {
+      const std::size_t first = map_of.try_emplace(identity_of(maps[i].map.keyframe(k)), i).first->second;
+      if (first < i) ++shared[first];
+    }
+    for (std::size_t j = 0; j < i; ++j) {
+      if (shared[j] == 0) continue;
+      return Error{maps[i].file, "keyframes",
+                   fmt::format("{} of {} in {} as well", shared[j], maps[i].map.num_keyframes(), maps[j].file),
+                   "maps without common keyframes, which would be in the merged map twice"};
+    }
+  }
+  return {};
+}
+
 // `maps` are sorted.
 Status check(const std::vector<SavedMap>& maps, const place::Vocabulary& vocabulary) {
   for (std::size_t i = 0; i < maps.size(); ++i) {
@@ -43,7 +64,7 @@ Status check(const std::vector<SavedMap>& maps, const place::Vocabulary& vocabul
       return Error{saved.file, "", "the same map as " + maps[i - 1].file, "different maps"};
     if (Status s = storage::fits(saved, maps.front().map.pyramid(), &vocabulary); !s) return s;
   }
-  return {};
+  return check_keyframes(maps);
 }
 
 std::string reason_of(const looping::JoinAttempts& attempts, const looping::LoopingOptions& options) {

@@ -31,8 +31,9 @@ struct MergeResult {
 
 // Appends all maps to the one with the most keyframes, whose world frame is kept, and searches a loop closure for every
 // keyframe of the others. Maps without a common place become separate submaps. The maps may be of different rigs. The
-// result does not depend on the order of `maps`. Errors: two maps are the same, differ in pyramid or vocabulary, have
-// no metric scale or no keyframes, or have too many cameras together.
+// result does not depend on the order of `maps`. Errors: two maps are the same, have a keyframe in common, because one
+// continues the other or was merged into it, differ in pyramid or vocabulary, have no metric scale or no keyframes, or
+// have too many cameras together.
 Result<MergeResult> merge_maps(std::vector<storage::SavedMap> maps, const place::VocabularyPtr& vocabulary,
                                const system::Config& config);
 

@@ -4,7 +4,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "place/content_hash.h"
+#include "session/keyframe_identity.h"
 #include "storage/submaps.h"
 
 namespace bslam::session {
@@ -14,17 +14,6 @@ using evaluation::TimedPose;
 using evaluation::Trajectory;
 using geometry::SE3;
 using storage::Submap;
-
-// Equal for the same keyframe in different maps.
-std::uint64_t identity_of(const map::BundledKeyframe& keyframe) {
-  place::ContentHash hash;
-  for (const frame::CameraFrame& camera : keyframe.frame->cameras) {
-    for (const feature::Descriptor& descriptor : camera.keypoints.descriptor) {
-      for (const std::uint64_t word : descriptor) hash.add(word);
-    }
-  }
-  return hash.value();
-}
 
 // A keyframe in both maps.
 struct Link {

@@ -14,9 +14,9 @@ struct TransferredTrajectory {
 };
 
 // Moves each pose by the transforms of the keyframes before and after it between the two maps. Keyframes are identified
-// by their descriptors, so that any number of merges may lie between the maps. `trajectory` must be of the run that
-// wrote `own`; of several submaps, the one with most keyframes at the times of its poses is used. Error: `merged` has
-// none of them.
+// by their keypoints (identity_of), so that any number of merges may lie between the maps. `trajectory` must be of the
+// run that wrote `own`; of several submaps, the one with most keyframes at the times of its poses is used. Error:
+// `merged` has none of them.
 Result<TransferredTrajectory> transfer_trajectory(const evaluation::Trajectory& trajectory,
                                                   const storage::SavedMap& own, const storage::SavedMap& merged);
 

@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <memory>
 
 #include "looping/simulated_hall.h"
+#include "session/keyframe_identity.h"
 #include "session/transfer_trajectory.h"
 #include "storage/submaps.h"
 
@@ -67,7 +69,7 @@ TEST(MergeMaps, JoinsRunsOfDifferentRigsAndNamesTheOneThatIsApart) {
 }
 
 TEST(MergeMaps, NamesTheLargestMapIfItIsTheOneThatIsApart) {
-  const auto result = merged({runs()[0], part_of_lap(6, 14, 2, "d"), part_of_lap(28, 46, 2, "largest")});
+  const auto result = merged({runs()[0], part_of_lap(6, 14, 4, "d"), part_of_lap(28, 46, 2, "largest")});
   ASSERT_TRUE(result);
   ASSERT_EQ(result->inputs.front().data, "largest");
   EXPECT_EQ(result->inputs[0].submap, 0u);
@@ -115,6 +117,30 @@ TEST(MergeMaps, RejectsTheSameMapTwice) {
   const auto result = merged({runs()[0], runs()[1], runs()[0]});
   ASSERT_FALSE(result);
   EXPECT_EQ(result.error().found, "the same map as a.bmap");
+}
+
+TEST(MergeMaps, RejectsAMapThatIsPartOfAnother) {
+  const auto result = merged({runs()[0], saved(merged_runs().map, "site")});
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().file, "a.bmap");
+  EXPECT_EQ(result.error().found, "12 of 12 in site.bmap as well");
+}
+
+// Twice the same images, as in overlapping parts of a recording: each run refines the keypoints in its own way.
+TEST(MergeMaps, TakesKeyframesOfOtherRunsOnTheSameImagesForOthers) {
+  const map::BundledMap& map = runs()[0].map;
+  const map::BundledKeyframe& keyframe = map.keyframe(map.keyframe_ids().front());
+  map::BundledKeyframe moved = keyframe;
+  frame::BundledFrame frame = *keyframe.frame;
+  std::vector<Eigen::Vector2f> pixels(frame.cameras[0].keypoints.pixel.begin(), frame.cameras[0].keypoints.pixel.end());
+  pixels.front().x() += 0.01f;
+  frame.cameras[0].keypoints.pixel = std::move(pixels);
+  moved.frame = std::make_shared<const frame::BundledFrame>(std::move(frame));
+  EXPECT_NE(identity_of(moved), identity_of(keyframe));
+  const SavedMap site = saved(merged_runs().map, "site");
+  EXPECT_TRUE(std::ranges::any_of(site.map.keyframe_ids(), [&](KeyframeId k) {
+    return identity_of(site.map.keyframe(k)) == identity_of(keyframe);
+  }));
 }
 
 TEST(MergeMaps, RejectsAMapWithoutMetricScale) {
