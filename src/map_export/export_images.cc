@@ -61,6 +61,15 @@ std::string rig_without_masks(const camera::Rig& rig) {
   return rig_formats::rig_to_yaml(rig_formats::without(rig, rig_formats::Droppable::kMasks));
 }
 
+// The undistorted image as the bytes of a PNG file; nullopt if the recorded one cannot be read.
+std::optional<std::string> undistorted_png(Exporter& exporter, const MapImage& image) {
+  if (!image.recorded) return std::nullopt;
+  const camera::Camera& camera = exporter.map().rig().camera(image.camera);
+  const auto colours = image_decoding::read_colours(*image.recorded, image.format);
+  if (!colours || colours->cols != camera.width || colours->rows != camera.height) return std::nullopt;
+  return image_decoding::encode_png(exporter.cameras.image(image.camera, *colours));
+}
+
 Result<AtomicFolder> folder_of(const Exporter& exporter) {
   return AtomicFolder::create(exporter.request.out, exporter.request.overwrite);
 }
@@ -73,21 +82,21 @@ void note_all(const std::vector<std::string>& notes, Exporter& exporter) {
 
 Status write_undistorted(Exporter& exporter, const AtomicFolder& folder) {
   std::size_t unread = 0;
+  std::vector<std::uint8_t> written;
   exporter.images.set_extensions(".png");
   for (const MapImage& image : exporter.images.images()) {
-    const camera::Camera& camera = exporter.map().rig().camera(image.camera);
-    const Result<cv::Mat> colours =
-        image.recorded ? image_decoding::read_colours(*image.recorded, image.format) : Result<cv::Mat>(Error{});
-    if (!colours || colours->cols != camera.width || colours->rows != camera.height) {
-      ++unread;
-      continue;
-    }
-    const std::string png = image_decoding::encode_png(exporter.cameras.image(image.camera, *colours));
-    if (Status s = folder.write(fs::path("images") / image.name, png); !s) return s;
+    const std::optional<std::string> png = undistorted_png(exporter, image);
+    written.push_back(png.has_value());
+    unread += image.recorded && !png;
+    if (!png) continue;
+    if (Status s = folder.write(fs::path("images") / image.name, *png); !s) return s;
   }
+  exporter.images.keep(written);
+  if (exporter.images.images().empty())
+    return Error{exporter.request.data_folder.string(), "--images", "no image of the map that can be read",
+                 "the recording from which the map was made"};
   if (unread > 0)
-    exporter.note(fmt::format("{} of {} images could not be read and were not undistorted", unread,
-                              exporter.images.images().size()));
+    exporter.note(fmt::format("{} of {} images could not be read; they are left out", unread, written.size()));
   std::vector<camera::RigCamera> cameras;
   for (std::size_t c = 0; c < exporter.map().rig().size(); ++c)
     cameras.push_back({exporter.cameras.camera(c), exporter.map().rig().body_from_cam(c)});
@@ -99,13 +108,12 @@ Status export_colmap(Exporter& exporter) {
   auto folder = folder_of(exporter);
   if (!folder) return folder.error();
   if (!exporter.request.data) exporter.note("the images are named CAMERA/STAMP.png: --images DATA names their files");
-  if (exporter.cameras.undistorted()) exporter.images.set_extensions(".png");
+  if (exporter.cameras.undistorted())
+    if (Status s = write_undistorted(exporter, *folder); !s) return s;
   const auto model = colmap_model(exporter.selection, exporter.images, exporter.cameras, colours);
   if (!model) return model.error();
   if (Status s = write_colmap(*model, *folder); !s) return s;
   note_all(model->notes, exporter);
-  if (exporter.cameras.undistorted())
-    if (Status s = write_undistorted(exporter, *folder); !s) return s;
   exporter.report.summary = fmt::format("{} images, {}, mean reprojection error {:.2f} px",
                                         exporter.images.images().size(), counts(exporter), model->mean_error_px);
   return folder->commit();
@@ -119,15 +127,14 @@ Status export_nerfstudio(Exporter& exporter) {
     exporter.note(
         "the images are expected as images/CAMERA/STAMP.png beside transforms.json: --images DATA names their "
         "files");
-  if (exporter.cameras.undistorted()) exporter.images.set_extensions(".png");
+  if (exporter.cameras.undistorted())
+    if (Status s = write_undistorted(exporter, *folder); !s) return s;
   const auto json =
       nerfstudio_json(exporter.selection, exporter.images, exporter.cameras, nerfstudio_paths(exporter), "points.ply");
   if (!json) return json.error();
   const std::string ply = landmarks_ply(exporter.selection, colours, exporter.selection.T_upright_world);
   if (Status s = folder->write("transforms.json", *json); !s) return s;
   if (Status s = folder->write("points.ply", ply); !s) return s;
-  if (exporter.cameras.undistorted())
-    if (Status s = write_undistorted(exporter, *folder); !s) return s;
   exporter.note_upward();
   exporter.report.summary = fmt::format("{} images, {}", exporter.images.images().size(), counts(exporter));
   return folder->commit();

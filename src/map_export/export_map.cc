@@ -61,8 +61,9 @@ Status check_images(Exporter& exporter) {
     return Error{exporter.request.data_folder.string(), "--images", "none of the images of the map",
                  "the recording from which the map was made"};
   if (found < all)
-    exporter.note(fmt::format("{} of {} images of the map are not in {}; they are named CAMERA/STAMP.png", all - found,
-                              all, exporter.request.data_folder.string()));
+    exporter.note(fmt::format(
+        "{} of {} images of the map are not in {}{}", all - found, all, exporter.request.data_folder.string(),
+        exporter.request.undistort ? "; they are left out" : "; they are named CAMERA/STAMP.png"));
   const auto in_recording = [](const MapImage& image) { return image.recorded && image.recorded->path.empty(); };
   if (!exporter.request.undistort && std::ranges::any_of(exporter.images.images(), in_recording))
     exporter.note(

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <map>
+#include <utility>
 
 #include "map/rigs_of_map.h"
 
@@ -107,6 +108,16 @@ ImageTable::ImageTable(const Selection& selection, const dataset::Dataset* data,
       number_[k.index() * cameras_ + c] = static_cast<int>(images_.size());
       images_.push_back(std::move(image));
     }
+  }
+}
+
+void ImageTable::keep(const std::vector<std::uint8_t>& kept) {
+  std::vector<MapImage> all = std::exchange(images_, {});
+  std::ranges::fill(number_, -1);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (!kept[i]) continue;
+    number_[all[i].keyframe.index() * cameras_ + all[i].camera] = static_cast<int>(images_.size());
+    images_.push_back(std::move(all[i]));
   }
 }
 

@@ -1,6 +1,7 @@
 // The images of the selected keyframes, with their names and files in the recording.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -30,6 +31,8 @@ class ImageTable {
   // Number of the image of a camera of a keyframe; -1 if it is missing.
   int of(KeyframeId k, std::size_t camera) const { return number_[k.index() * cameras_ + camera]; }
   std::size_t found() const { return found_; }  // number of images that are in the recording
+  // Removes the images whose entry, one for each image, is zero.
+  void keep(const std::vector<std::uint8_t>& kept);
   // Makes all names those of files in a new folder, with the extension, such as ".png": "_" replaces what leads out of
   // the folder.
   void set_extensions(const std::string& extension);

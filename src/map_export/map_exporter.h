@@ -25,8 +25,8 @@ struct Exporter {
   LandmarkColours colours();
 };
 
-// Writes undistorted images as images/NAME.png, and their calibration as rig.yaml. Names of images end in .png from
-// then on. An image that cannot be read is left out, and noted.
+// Writes undistorted images as images/NAME.png, and their calibration as rig.yaml. From then on, names of images end in
+// .png, and images that cannot be read are not in the table; a note says how many. Error: none can be read.
 Status write_undistorted(Exporter& exporter, const AtomicFolder& folder);
 
 // Each writes one format.

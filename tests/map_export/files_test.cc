@@ -209,6 +209,40 @@ TEST_F(MapExportFiles, UndistortedImagesAndTheirCalibrationAreBesideTheModel) {
   EXPECT_EQ(camera::intrinsics(rig->camera(0).model).fx, json["frames"][0]["fl_x"]);
 }
 
+// The names of the images of a model of COLMAP.
+std::vector<std::string> names_in(const fs::path& images_txt) {
+  std::istringstream file(read_text(images_txt));
+  std::vector<std::string> names;
+  for (std::string word; file >> word;)
+    if (word.ends_with(".png") || word.ends_with(".jpg")) names.push_back(word);
+  return names;
+}
+
+TEST_F(MapExportFiles, ModelsOfUndistortedImagesContainTheWrittenOnesOnly) {
+  const std::size_t all = ImageTable(selection_, nullptr, {}).images().size();
+  data_.frames.front().images[0] = std::nullopt;  // not in the recording
+  support::write_text(data_.frames[1].images[1]->path, "damaged");
+  ExportRequest undistort = request(Format::kColmap, "colmap");
+  undistort.undistort = true;
+  const auto report = export_map(map_, undistort);
+  ASSERT_TRUE(report) << report.error().message();
+  for (const char* const text : {"; they are left out", "images could not be read; they are left out"})
+    EXPECT_TRUE(std::ranges::any_of(report->notes, [&](const std::string& n) { return n.ends_with(text); })) << text;
+  const std::vector<std::string> names = names_in(folder_.path() / "colmap/images.txt");
+  EXPECT_EQ(names.size(), all - 2);
+  for (const std::string& name : names) EXPECT_TRUE(fs::exists(folder_.path() / "colmap/images" / name)) << name;
+  undistort.format = Format::kNerfstudio;
+  undistort.out = folder_.path() / "nerf";
+  ASSERT_TRUE(export_map(map_, undistort));
+  const auto json = nlohmann::json::parse(read_text(folder_.path() / "nerf/transforms.json"));
+  EXPECT_EQ(json["frames"].size(), all - 2);
+  for (const auto& frame : json["frames"])
+    EXPECT_TRUE(fs::exists(folder_.path() / "nerf" / frame["file_path"].get<std::string>())) << frame["file_path"];
+  fs::remove_all(root());
+  undistort.overwrite = true;
+  EXPECT_EQ(export_map(map_, undistort).error().found, "no image of the map that can be read");
+}
+
 TEST_F(MapExportFiles, PathsOfNerfstudioLeadFromItsFolderToTheRecording) {
   ASSERT_TRUE(export_map(map_, request(Format::kNerfstudio, "nerf")));
   const auto json = nlohmann::json::parse(read_text(folder_.path() / "nerf/transforms.json"));
