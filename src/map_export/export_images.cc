@@ -43,15 +43,23 @@ Status write_keyframes(const Exporter& exporter, const AtomicFolder& folder) {
   return {};
 }
 
-// file_path of every image: undistorted ones are in the folder, recorded ones are reached from it.
+// The path without links in the folders of a file, which may itself be a link.
+fs::path without_links(const fs::path& file) {
+  std::error_code error;
+  const fs::path absolute = fs::absolute(file), folder = fs::weakly_canonical(absolute.parent_path(), error);
+  return (error ? absolute.parent_path() : folder) / absolute.filename();
+}
+
+// file_path of every image: undistorted ones are in the folder, recorded ones are reached from it, or from the folder
+// that it leads to if it is a link.
 std::vector<std::string> nerfstudio_paths(const Exporter& exporter) {
   std::vector<std::string> paths;
-  const fs::path out = fs::absolute(exporter.request.out).lexically_normal();
+  const fs::path out = without_links(exporter.request.out / "transforms.json").parent_path();
   for (const MapImage& image : exporter.images.images()) {
     const bool is_file = image.recorded && !image.recorded->path.empty();
     const bool in_folder = !is_file || exporter.cameras.undistorted();
-    const fs::path file = in_folder ? fs::path() : fs::absolute(image.recorded->path).lexically_normal();
-    paths.push_back(in_folder ? "images/" + image.name : file.lexically_relative(out).string());
+    paths.push_back(in_folder ? "images/" + image.name
+                              : without_links(image.recorded->path).lexically_relative(out).string());
   }
   return paths;
 }

@@ -244,10 +244,15 @@ TEST_F(MapExportFiles, ModelsOfUndistortedImagesContainTheWrittenOnesOnly) {
 }
 
 TEST_F(MapExportFiles, PathsOfNerfstudioLeadFromItsFolderToTheRecording) {
-  ASSERT_TRUE(export_map(map_, request(Format::kNerfstudio, "nerf")));
-  const auto json = nlohmann::json::parse(read_text(folder_.path() / "nerf/transforms.json"));
-  for (const auto& frame : json["frames"])
-    EXPECT_TRUE(fs::exists(folder_.path() / "nerf" / frame["file_path"].get<std::string>())) << frame["file_path"];
+  fs::create_directories(folder_.path() / "elsewhere/deep/target");
+  fs::create_directory_symlink(folder_.path() / "elsewhere/deep/target", folder_.path() / "link");
+  fs::create_directory_symlink(folder_.path() / "elsewhere/deep", folder_.path() / "above");
+  for (const char* const out : {"nerf", "link", "above/nerf"}) {
+    ASSERT_TRUE(export_map(map_, request(Format::kNerfstudio, out))) << out;
+    const auto json = nlohmann::json::parse(read_text(folder_.path() / out / "transforms.json"));
+    for (const auto& frame : json["frames"])
+      EXPECT_TRUE(fs::exists(folder_.path() / out / frame["file_path"].get<std::string>())) << frame["file_path"];
+  }
 }
 
 // The images of a recording in one file, such as a bag: here the files of the folder.
