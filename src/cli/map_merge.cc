@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -63,20 +62,6 @@ void print_json(const session::MergeResult& merged) {
   std::printf("%s\n", all.dump(1, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
 }
 
-// The maps are not scaled: metric maps whose scales differ contain a wrong calibration.
-std::vector<std::string> scale_warnings(const session::MergeResult& merged) {
-  std::vector<std::string> out;
-  for (const session::ScaleComparison& c : merged.scales) {
-    if (!c.disagrees()) continue;
-    out.push_back(
-        fmt::format("the scales of {} and {} disagree: lengths are {:.2f} % {} in the second (std {:.2f} %); no map "
-                    "was scaled, so the merged map is distorted: check the baselines of both calibrations",
-                    merged.inputs[c.first].file, merged.inputs[c.second].file, 100 * std::abs(c.ratio - 1),
-                    c.ratio > 1 ? "longer" : "shorter", 100 * c.deviation));
-  }
-  return out;
-}
-
 void print_text(const session::MergeResult& merged) {
   for (const session::MergedInput& input : merged.inputs) {
     if (!input.reason.empty()) fmt::print("not joined: {}: {} (submap {})\n", input.file, input.reason, input.submap);
@@ -111,7 +96,7 @@ Status write(const session::MergeResult& merged, const place::Vocabulary& vocabu
   std::vector<std::string> recordings;
   for (const session::MergedInput& input : merged.inputs) recordings.push_back(input.data);
   const storage::MapFileInfo info{vocabulary.id(), version_number(), fmt::format("{}", fmt::join(recordings, " + ")),
-                                  warnings.empty() ? "" : warnings.front()};
+                                  fmt::format("{}", fmt::join(warnings, "; "))};
   return storage::write_map(merged.map, info, file);
 }
 
@@ -132,7 +117,7 @@ int map_merge(const MergeArguments& arguments) {
   if (!vocabulary) return report_error(vocabulary.error());
   const auto merged = merge(arguments, *vocabulary);
   if (!merged) return report_error(merged.error());
-  const std::vector<std::string> warnings = scale_warnings(*merged);
+  const std::vector<std::string> warnings = session::warnings_of(*merged);
   if (!arguments.dry_run) {
     if (const Status s = write(*merged, **vocabulary, warnings, arguments.out); !s) return report_error(s.error());
   }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <memory>
 #include <tuple>
@@ -173,10 +174,25 @@ Result<MergeResult> merge_maps(std::vector<SavedMap> maps, const place::Vocabula
   for (std::size_t i = 0; i < maps.size(); ++i) {
     const bool joined = submaps[i] == largest;
     result.inputs.push_back({maps[i].file, maps[i].info.data, inputs->keyframes[i].size(), submaps[i],
-                             joined ? "" : reason_of(attempts[i], config.looping)});
+                             joined ? "" : reason_of(attempts[i], config.looping), maps[i].info.warning});
   }
   result.scales = compare_scales(result.map, inputs->parts);
   return result;
+}
+
+std::vector<std::string> warnings_of(const MergeResult& merged) {
+  std::vector<std::string> out;
+  for (const MergedInput& input : merged.inputs)
+    if (!input.warning.empty()) out.push_back(input.file + ": " + input.warning);
+  for (const ScaleComparison& c : merged.scales) {
+    if (!c.disagrees()) continue;
+    out.push_back(
+        fmt::format("the scales of {} and {} disagree: lengths are {:.2f} % {} in the second (std {:.2f} %); no map "
+                    "was scaled, so the merged map is distorted: check the baselines of both calibrations",
+                    merged.inputs[c.first].file, merged.inputs[c.second].file, 100 * std::abs(c.ratio - 1),
+                    c.ratio > 1 ? "longer" : "shorter", 100 * c.deviation));
+  }
+  return out;
 }
 
 void adjust_merged(map::BundledMap& map, const system::Config& config) {

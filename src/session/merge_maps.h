@@ -19,6 +19,7 @@ struct MergedInput {
   std::size_t keyframes = 0;  // its keyframes follow those of the previous input, in the same order
   std::size_t submap = 0;     // submap of most of its keyframes: index into the roots of the result
   std::string reason = {};    // reason why it is not in the submap of most inputs; empty if it is
+  std::string warning = {};   // reason why its poses cannot be relied on; may be empty
 };
 
 struct MergeResult {
@@ -36,6 +37,10 @@ struct MergeResult {
 // have too many cameras together.
 Result<MergeResult> merge_maps(std::vector<storage::SavedMap> maps, const place::VocabularyPtr& vocabulary,
                                const system::Config& config);
+
+// Reasons why the poses of the merged map cannot be relied on: those of the inputs, with their files, and scales that
+// disagree. The maps are not scaled: metric maps whose scales differ contain a wrong calibration.
+std::vector<std::string> warnings_of(const MergeResult& merged);
 
 // The global bundle adjustment that follows.
 void adjust_merged(map::BundledMap& map, const system::Config& config);

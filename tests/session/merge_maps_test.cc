@@ -113,6 +113,20 @@ TEST(MergeMaps, SaysWhichMapsDisagreeAboutTheScale) {
   EXPECT_TRUE(result->scales[0].disagrees());
 }
 
+TEST(MergeMaps, KeepsTheWarningsOfAllMapsAndScales) {
+  EXPECT_TRUE(warnings_of(merged_runs()).empty());
+  std::vector<SavedMap> maps = {runs()[0], scaled(runs()[1], 1.03), runs()[2]};
+  maps[0].info.warning = "one reason";
+  maps[2].info.warning = "another reason";
+  const auto result = merged(maps);
+  ASSERT_TRUE(result) << result.error().message();
+  const std::vector<std::string> warnings = warnings_of(*result);
+  ASSERT_EQ(warnings.size(), 4u);
+  EXPECT_EQ(warnings[0], "a.bmap: one reason");
+  EXPECT_EQ(warnings[1], "c.bmap: another reason");
+  for (const std::size_t i : {2, 3}) EXPECT_TRUE(warnings[i].starts_with("the scales of b.bmap and ")) << warnings[i];
+}
+
 TEST(MergeMaps, RejectsTheSameMapTwice) {
   const auto result = merged({runs()[0], runs()[1], runs()[0]});
   ASSERT_FALSE(result);
