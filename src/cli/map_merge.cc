@@ -91,11 +91,10 @@ Result<session::MergeResult> merge(const MergeArguments& arguments, const place:
   return merged;
 }
 
-Status write(const session::MergeResult& merged, const place::Vocabulary& vocabulary,
-             const std::vector<std::string>& warnings, const std::string& file) {
+Status write(const session::MergeResult& merged, const std::vector<std::string>& warnings, const std::string& file) {
   std::vector<std::string> recordings;
   for (const session::MergedInput& input : merged.inputs) recordings.push_back(input.data);
-  const storage::MapFileInfo info{vocabulary.id(), version_number(), fmt::format("{}", fmt::join(recordings, " + ")),
+  const storage::MapFileInfo info{merged.vocabulary, version_number(), fmt::format("{}", fmt::join(recordings, " + ")),
                                   fmt::format("{}", fmt::join(warnings, "; "))};
   return storage::write_map(merged.map, info, file);
 }
@@ -119,7 +118,7 @@ int map_merge(const MergeArguments& arguments) {
   if (!merged) return report_error(merged.error());
   const std::vector<std::string> warnings = session::warnings_of(*merged);
   if (!arguments.dry_run) {
-    if (const Status s = write(*merged, **vocabulary, warnings, arguments.out); !s) return report_error(s.error());
+    if (const Status s = write(*merged, warnings, arguments.out); !s) return report_error(s.error());
   }
   for (const std::string& warning : warnings) print_message("warning: {}\n", warning);
   arguments.json ? print_json(*merged) : print_text(*merged);

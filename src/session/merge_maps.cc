@@ -61,6 +61,8 @@ Status check(const std::vector<SavedMap>& maps, const place::Vocabulary& vocabul
       return Error{saved.file, "scale", "a map without metric scale",
                    "a metric map, since only metric maps can be merged"};
     if (saved.map.num_keyframes() == 0) return Error{saved.file, "keyframes", "none", "a map with keyframes"};
+    if (maps.size() > 1 && saved.info.vocabulary == 0)
+      return Error{saved.file, "vocabulary", "none", "a map with visual words, in which places can be recognised"};
     if (i > 0 && saved.checksums == maps[i - 1].checksums)
       return Error{saved.file, "", "the same map as " + maps[i - 1].file, "different maps"};
     if (Status s = storage::fits(saved, maps.front().map.pyramid(), &vocabulary); !s) return s;
@@ -176,6 +178,7 @@ Result<MergeResult> merge_maps(std::vector<SavedMap> maps, const place::Vocabula
     result.inputs.push_back({maps[i].file, maps[i].info.data, inputs->keyframes[i].size(), submaps[i],
                              joined ? "" : reason_of(attempts[i], config.looping), maps[i].info.warning});
   }
+  result.vocabulary = maps.front().info.vocabulary;
   result.scales = compare_scales(result.map, inputs->parts);
   return result;
 }

@@ -1,6 +1,7 @@
 // Merges maps of separate runs that contain common places.
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <string>
 #include <vector>
@@ -28,13 +29,14 @@ struct MergeResult {
   int joined = 0;                   // submaps that were merged into others
   int loops = 0;                    // further loop closures
   std::vector<ScaleComparison> scales = {};  // one per pair of inputs with common landmarks
+  std::uint64_t vocabulary = 0;              // Vocabulary::id() of the words of the map; 0 if it has none
 };
 
 // Appends all maps to the one with the most keyframes, whose world frame is kept, and searches a loop closure for every
 // keyframe of the others. Maps without a common place become separate submaps. The maps may be of different rigs. The
 // result does not depend on the order of `maps`. Errors: two maps are the same, have a keyframe in common, because one
-// continues the other or was merged into it, differ in pyramid or vocabulary, have no metric scale or no keyframes, or
-// have too many cameras together.
+// continues the other or was merged into it, differ in pyramid or vocabulary, have no words, by which places are
+// recognised, no metric scale or no keyframes, or have too many cameras together. A single map may have no words.
 Result<MergeResult> merge_maps(std::vector<storage::SavedMap> maps, const place::VocabularyPtr& vocabulary,
                                const system::Config& config);
 

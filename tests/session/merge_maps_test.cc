@@ -166,6 +166,19 @@ TEST(MergeMaps, RejectsAMapWithoutMetricScale) {
   EXPECT_EQ(result.error().key, "scale");
 }
 
+// Only one map can do without, since there is nothing to recognise; the result has none either.
+TEST(MergeMaps, RejectsAMapWithoutVisualWords) {
+  SavedMap without = storage::map_from_bytes(storage::map_to_bytes(runs()[0].map, {}), "wordless.bmap").value();
+  const auto result = merged({runs()[1], without});
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().file, "wordless.bmap");
+  EXPECT_EQ(result.error().key, "vocabulary");
+  const auto alone = merged({without});
+  ASSERT_TRUE(alone) << alone.error().message();
+  EXPECT_EQ(alone->vocabulary, 0u);
+  EXPECT_EQ(merged_runs().vocabulary, looping::small_vocabulary()->id());
+}
+
 TEST(TransferTrajectory, FollowsTheKeyframesOfTheRun) {
   const SavedMap site = saved(merged_runs().map, "site"), &own = runs()[0];
   const evaluation::Trajectory keyframes = storage::keyframe_trajectory(own.map, storage::submaps_of(own.map)[0]);
