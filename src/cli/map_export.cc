@@ -8,6 +8,7 @@
 
 #include "base/output_file.h"
 #include "cli/dataset_arguments.h"
+#include "cli/interruption.h"
 #include "cli/print_message.h"
 #include "cli/verbs.h"
 #include "dataset/dataset.h"
@@ -80,8 +81,13 @@ int run_map_export(ExportArguments arguments) {
   }
   arguments.request.data = data ? &*data : nullptr;
   arguments.request.data_folder = arguments.images;
+  const Interruption interruption;
+  arguments.request.interrupted = interruption.token();
   const auto report = map_export::export_map(saved->map, arguments.request);
-  if (!report) return report_error(report.error());
+  if (!report) {
+    const int status = report_error(report.error());
+    return interruption.token().stop_requested() ? kExitInterrupted : status;
+  }
   for (const std::string& note : report->notes) print_message("note: {}\n", note);
   std::printf("%s: %s\n", arguments.request.out.c_str(), report->summary.c_str());
   return kExitOk;

@@ -10,8 +10,10 @@
 #include <utility>
 #include <vector>
 
+#include "base/interrupted.h"
 #include "base/output_file.h"
 #include "cli/config_arguments.h"
+#include "cli/interruption.h"
 #include "cli/print_message.h"
 #include "cli/verbs.h"
 #include "cli/version.h"
@@ -77,17 +79,20 @@ void print_text(const session::MergeResult& merged) {
              counted(merged.map.roots().size(), "submap"));
 }
 
-Result<session::MergeResult> merge(const MergeArguments& arguments, const place::VocabularyPtr& vocabulary) {
+Result<session::MergeResult> merge(const MergeArguments& arguments, const place::VocabularyPtr& vocabulary,
+                                   const std::stop_token& interrupted) {
   auto config = resolve_config(arguments.config);
   if (!config) return config.error();
   std::vector<storage::SavedMap> maps;
   for (const std::string& file : arguments.files) {
+    if (Status s = not_interrupted(interrupted); !s) return s.error();
     auto saved = storage::read_map(file);
     if (!saved) return saved.error();
     maps.push_back(*std::move(saved));
   }
-  auto merged = session::merge_maps(std::move(maps), vocabulary, *config);
-  if (merged && !arguments.dry_run && !arguments.no_final_ba) session::adjust_merged(merged->map, *config);
+  auto merged = session::merge_maps(std::move(maps), vocabulary, *config, interrupted);
+  if (merged && !arguments.dry_run && !arguments.no_final_ba) session::adjust_merged(merged->map, *config, interrupted);
+  if (Status s = not_interrupted(interrupted); !s) return s.error();
   return merged;
 }
 
@@ -114,8 +119,12 @@ int map_merge(const MergeArguments& arguments) {
   if (const Status s = check_out(arguments); !s) return report_error(s.error());
   const auto vocabulary = storage::vocabulary_or_shipped(arguments.vocabulary);
   if (!vocabulary) return report_error(vocabulary.error());
-  const auto merged = merge(arguments, *vocabulary);
-  if (!merged) return report_error(merged.error());
+  const Interruption interruption;
+  const auto merged = merge(arguments, *vocabulary, interruption.token());
+  if (!merged) {
+    const int status = report_error(merged.error());
+    return interruption.token().stop_requested() ? kExitInterrupted : status;
+  }
   const std::vector<std::string> warnings = session::warnings_of(*merged);
   if (!arguments.dry_run) {
     if (const Status s = write(*merged, warnings, arguments.out); !s) return report_error(s.error());

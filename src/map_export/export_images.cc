@@ -1,6 +1,7 @@
 // Exports of poses with images: COLMAP, nerfstudio, and the folder of all.
 #include <fmt/format.h>
 
+#include "base/interrupted.h"
 #include "evaluation/trajectory_file.h"
 #include "image_decoding/colour_image.h"
 #include "map_export/colmap_model.h"
@@ -79,6 +80,7 @@ std::optional<std::string> undistorted_png(Exporter& exporter, const MapImage& i
 }
 
 Result<AtomicFolder> folder_of(const Exporter& exporter) {
+  if (Status s = not_interrupted(exporter.request.interrupted); !s) return s.error();
   return AtomicFolder::create(exporter.request.out, exporter.request.overwrite);
 }
 
@@ -93,6 +95,7 @@ Status write_undistorted(Exporter& exporter, const AtomicFolder& folder) {
   std::vector<std::uint8_t> written;
   exporter.images.set_extensions(".png");
   for (const MapImage& image : exporter.images.images()) {
+    if (Status s = not_interrupted(exporter.request.interrupted); !s) return s;
     const std::optional<std::string> png = undistorted_png(exporter, image);
     written.push_back(png.has_value());
     unread += image.recorded && !png;

@@ -6,6 +6,7 @@
 #include <array>
 
 #include "base/atomic_file.h"
+#include "base/interrupted.h"
 #include "map_export/map_exporter.h"
 #include "map_export/point_cloud.h"
 #include "map_export/pose_graph_file.h"
@@ -72,6 +73,7 @@ Status check_images(Exporter& exporter) {
 }
 
 Status write(Exporter& exporter) {
+  if (Status s = not_interrupted(exporter.request.interrupted); !s) return s;
   switch (exporter.request.format) {
     case Format::kColmap:
       return export_colmap(exporter);
@@ -101,7 +103,7 @@ std::string upward_note() {
 std::span<const FormatName> formats() { return kFormats; }
 
 LandmarkColours Exporter::colours() {
-  LandmarkColours colours = landmark_colours(selection, images);
+  LandmarkColours colours = landmark_colours(selection, images, request.interrupted);
   if (!request.data) {
     note("the points are grey: their colours are taken from the images with --images DATA");
   } else if (colours.read < images.images().size()) {
@@ -113,6 +115,7 @@ LandmarkColours Exporter::colours() {
 
 Status export_ply(Exporter& exporter) {
   const LandmarkColours colours = exporter.colours();
+  if (Status s = not_interrupted(exporter.request.interrupted); !s) return s;
   exporter.report.summary = fmt::format("{} landmarks", exporter.selection.landmarks.size());
   return write_atomically(exporter.request.out, landmarks_ply(exporter.selection, colours));
 }

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <optional>
 #include <span>
+#include <stop_token>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -39,6 +40,7 @@ struct ExportRequest {
   std::optional<double> max_range;         // kOctomap, kNav2: default: ten times the median depth
   HeightBand band;                         // kNav2
   std::optional<geometry::UpAxis> up;      // kNerfstudio, kOctomap, kNav2: default: upward_note()
+  std::stop_token interrupted;             // a stop request ends the export, and nothing is written
 };
 
 // A note for the user about the vertical direction that is used if `up` is not given.
@@ -53,7 +55,7 @@ struct ExportReport {
 // of the same names, and its other files stay, since they may not be those of an export; after an error the folder is
 // unchanged, but not if the program is killed while files are moved there. Errors: the map is empty; `out` exists and
 // is not to be overwritten, or cannot be written; none of the images of the map is in the recording; the format cannot
-// hold a camera; options that do not fit the format.
+// hold a camera; options that do not fit the format; that of not_interrupted.
 Result<ExportReport> export_map(const map::BundledMap& map, const ExportRequest& request);
 
 }  // namespace bslam::map_export

@@ -43,7 +43,7 @@ std::string keyframes_text(const Exporter& exporter) {
 
 Status export_octomap(Exporter& exporter) {
   const CarvingOptions options = carving_options(exporter);
-  const auto octree = octree_of(scans_of(exporter.selection), options);
+  const auto octree = octree_of(scans_of(exporter.selection), options, exporter.request.interrupted);
   if (!octree) return octree.error();
   exporter.note(axes_text(exporter));
   exporter.note_upward();
@@ -57,7 +57,7 @@ Status export_nav2(Exporter& exporter) {
   const HeightBand& band = exporter.request.band;
   auto folder = AtomicFolder::create(exporter.request.out, exporter.request.overwrite);
   if (!folder) return folder.error();
-  const auto grid = occupancy_grid(scans_of(exporter.selection), options, band);
+  const auto grid = occupancy_grid(scans_of(exporter.selection), options, band, exporter.request.interrupted);
   if (!grid) return grid.error();
   const std::vector<std::string> comments = {
       axes_text(exporter),

@@ -29,13 +29,15 @@ void add_colours(const cv::Mat& colours, const map::BundledKeyframe& keyframe, s
 
 }  // namespace
 
-LandmarkColours landmark_colours(const Selection& selection, const ImageTable& images) {
+LandmarkColours landmark_colours(const Selection& selection, const ImageTable& images,
+                                 const std::stop_token& interrupted) {
   std::vector<int> number(selection.map->landmark_slots(), -1);
   for (std::size_t i = 0; i < selection.landmarks.size(); ++i)
     number[selection.landmarks[i].index()] = static_cast<int>(i);
   std::vector<Sum> sums(selection.landmarks.size());
   LandmarkColours result;
   for (const MapImage& image : images.images()) {
+    if (interrupted.stop_requested()) break;
     if (!image.recorded) continue;
     const auto colours = image_decoding::read_colours(*image.recorded, image.format);
     const camera::Camera& camera = selection.map->rig().camera(image.camera);

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <stop_token>
 #include <vector>
 
 #include "map_export/image_table.h"
@@ -17,7 +18,8 @@ struct LandmarkColours {
 };
 
 // The mean of the colours at all keypoints of each landmark. Images without a file, or that cannot be read or have
-// another size than their camera, are ignored.
-LandmarkColours landmark_colours(const Selection& selection, const ImageTable& images);
+// another size than their camera, are ignored. After a stop request, no further images are read.
+LandmarkColours landmark_colours(const Selection& selection, const ImageTable& images,
+                                 const std::stop_token& interrupted = {});
 
 }  // namespace bslam::map_export

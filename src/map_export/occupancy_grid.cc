@@ -7,6 +7,8 @@
 #include <cmath>
 #include <optional>
 
+#include "base/interrupted.h"
+
 namespace bslam::map_export {
 namespace {
 
@@ -127,7 +129,7 @@ class Observations {
 }  // namespace
 
 Result<OccupancyGrid> occupancy_grid(const std::vector<Scan>& scans, const CarvingOptions& options,
-                                     const HeightBand& band) {
+                                     const HeightBand& band, const std::stop_token& interrupted) {
   Eigen::AlignedBox2d box;
   for (const Scan& scan : scans) {
     box.extend(scan.origin.head<2>().eval());
@@ -145,7 +147,10 @@ Result<OccupancyGrid> occupancy_grid(const std::vector<Scan>& scans, const Carvi
         "", "--resolution", fmt::format("{}", options.resolution),
         fmt::format("larger cells: the map is {:.0f} x {:.0f} units large", padded.sizes().x(), padded.sizes().y())};
   Observations observations(padded, options.resolution);
-  for (std::size_t i = 0; i < scans.size(); ++i) observations.add(scans[i], static_cast<int>(i), options, band);
+  for (std::size_t i = 0; i < scans.size(); ++i) {
+    if (Status s = not_interrupted(interrupted); !s) return s.error();
+    observations.add(scans[i], static_cast<int>(i), options, band);
+  }
   return observations.grid();
 }
 

@@ -27,9 +27,9 @@ struct OccupancyGrid {
 
 // Carves free space along the parts of rays that are within the band, around the height of camera 0 of their keyframe,
 // and marks the cells of landmarks within the band. Cells with few observations remain unknown. Error (file left
-// empty): the map would have more than 10^8 cells.
+// empty): the map would have more than 10^8 cells; that of not_interrupted.
 Result<OccupancyGrid> occupancy_grid(const std::vector<Scan>& scans, const CarvingOptions& options,
-                                     const HeightBand& band);
+                                     const HeightBand& band, const std::stop_token& interrupted = {});
 
 // The image of a grid (PGM: 0 occupied, 205 unknown, 254 free; y upward), and its description for the map server.
 // `comments`: lines at the top of the description, without `#`.

@@ -5,6 +5,8 @@
 
 #include <sstream>
 
+#include "base/interrupted.h"
+
 namespace bslam::map_export {
 namespace {
 
@@ -36,9 +38,11 @@ bool insert(const Scan& scan, const CarvingOptions& options, octomap::OcTree& tr
 
 }  // namespace
 
-Result<OctreeFile> octree_of(const std::vector<Scan>& scans, const CarvingOptions& options) {
+Result<OctreeFile> octree_of(const std::vector<Scan>& scans, const CarvingOptions& options,
+                             const std::stop_token& interrupted) {
   octomap::OcTree tree(options.resolution);
   for (const Scan& scan : scans) {
+    if (Status s = not_interrupted(interrupted); !s) return s.error();
     if (!insert(scan, options, tree))
       return Error{"", "--resolution", std::to_string(options.resolution),
                    "larger cells: an octree has 65536 cells along each side"};

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "base/assert.h"
+#include "base/interrupted.h"
 #include "looping/loop_closer.h"
 #include "map/append_map.h"
 #include "map/map_store.h"
@@ -136,12 +137,13 @@ bool is_apart(const map::BundledMap& map, const std::vector<std::vector<Keyframe
          (std::ranges::count(submaps, submaps.front()) == 1 || submaps.front() != most_frequent(submaps));
 }
 
-// Searches loop closures for the keyframes of a map, which has been appended, and commits them.
+// Searches loop closures for the keyframes of a map, which has been appended, and commits them, until a stop request.
 looping::JoinAttempts join(const std::vector<KeyframeId>& keyframes, looping::LoopCloser& closer, map::MapStore& store,
-                           MergeResult& result) {
+                           MergeResult& result, const std::stop_token& interrupted) {
   looping::JoinAttempts attempts;
   closer.begin_path();
   for (const KeyframeId k : keyframes) {
+    if (interrupted.stop_requested()) break;
     map::MapDraft draft(store.snapshot());
     const auto closure = closer.close(k, draft, &attempts);
     if (!closure) continue;
@@ -155,7 +157,7 @@ looping::JoinAttempts join(const std::vector<KeyframeId>& keyframes, looping::Lo
 }  // namespace
 
 Result<MergeResult> merge_maps(std::vector<SavedMap> maps, const place::VocabularyPtr& vocabulary,
-                               const system::Config& config) {
+                               const system::Config& config, const std::stop_token& interrupted) {
   std::ranges::sort(maps, before);
   if (Status s = check(maps, *vocabulary); !s) return s.error();
   const feature::FeatureModel features = features_of(maps.front().map, config);
@@ -167,8 +169,11 @@ Result<MergeResult> merge_maps(std::vector<SavedMap> maps, const place::Vocabula
                              config.looping, features, static_cast<std::uint64_t>(config.seed));
   // The first map is the one in which the others are searched; it is searched in them if it has remained apart.
   std::vector<looping::JoinAttempts> attempts(maps.size());
-  for (std::size_t i = 1; i < maps.size(); ++i) attempts[i] = join(inputs->keyframes[i], closer, store, result);
-  if (is_apart(*store.snapshot(), inputs->keyframes)) attempts[0] = join(inputs->keyframes[0], closer, store, result);
+  for (std::size_t i = 1; i < maps.size(); ++i)
+    attempts[i] = join(inputs->keyframes[i], closer, store, result, interrupted);
+  if (is_apart(*store.snapshot(), inputs->keyframes))
+    attempts[0] = join(inputs->keyframes[0], closer, store, result, interrupted);
+  if (Status s = not_interrupted(interrupted); !s) return s.error();
   result.map = *store.snapshot();
   BSLAM_ASSERT(result.map.num_keyframes() == result.map.keyframe_slots(), "merging must not remove keyframes");
   const std::vector<std::size_t> submaps = submaps_of_inputs(result.map, inputs->keyframes);
@@ -198,11 +203,11 @@ std::vector<std::string> warnings_of(const MergeResult& merged) {
   return out;
 }
 
-void adjust_merged(map::BundledMap& map, const system::Config& config) {
+void adjust_merged(map::BundledMap& map, const system::Config& config, const std::stop_token& interrupted) {
   const feature::FeatureModel features = features_of(map, config);
   map::MapStore store(std::move(map));
   map::MapDraft draft(store.snapshot());
-  mapping::adjust_globally(config.mapping, features, draft);
+  mapping::adjust_globally(config.mapping, features, draft, interrupted);
   store.commit(std::move(draft));
   map = *store.snapshot();
 }

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <span>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -36,15 +37,16 @@ struct MergeResult {
 // keyframe of the others. Maps without a common place become separate submaps. The maps may be of different rigs. The
 // result does not depend on the order of `maps`. Errors: two maps are the same, have a keyframe in common, because one
 // continues the other or was merged into it, differ in pyramid or vocabulary, have no words, by which places are
-// recognised, no metric scale or no keyframes, or have too many cameras together. A single map may have no words.
+// recognised, no metric scale or no keyframes, or have too many cameras together. A single map may have no words. That
+// of not_interrupted.
 Result<MergeResult> merge_maps(std::vector<storage::SavedMap> maps, const place::VocabularyPtr& vocabulary,
-                               const system::Config& config);
+                               const system::Config& config, const std::stop_token& interrupted = {});
 
 // Reasons why the poses of the merged map cannot be relied on: those of the inputs, with their files, and scales that
 // disagree. The maps are not scaled: metric maps whose scales differ contain a wrong calibration.
 std::vector<std::string> warnings_of(const MergeResult& merged);
 
-// The global bundle adjustment that follows.
-void adjust_merged(map::BundledMap& map, const system::Config& config);
+// The global bundle adjustment that follows. After a stop request, it ends early.
+void adjust_merged(map::BundledMap& map, const system::Config& config, const std::stop_token& interrupted = {});
 
 }  // namespace bslam::session

@@ -297,6 +297,48 @@ TEST_F(MapExportFiles, ImagesInsideOfARecordingGiveColoursAndUndistortedFiles) {
   EXPECT_EQ(named, ImageTable(selection_, nullptr, {}).images().size());
 }
 
+// A recording during whose reading the user interrupts the program.
+class InterruptedFiles : public StoredFiles {
+ public:
+  Result<image_files::StoredImage> read(std::int64_t entry) const override {
+    if (++reads == last) source.request_stop();
+    return StoredFiles::read(entry);
+  }
+  mutable std::stop_source source;
+  std::size_t last = 0;  // number of the read at which a stop is requested
+  mutable std::size_t reads = 0;
+};
+
+TEST_F(MapExportFiles, AnInterruptedExportEndsBeforeTheNextImageAndLeavesNothing) {
+  const std::size_t all = ImageTable(selection_, nullptr, {}).images().size();
+  for (const std::size_t last : {std::size_t{2}, all + 2}) {  // for the colours, and for the undistorted images
+    const auto store = std::make_shared<InterruptedFiles>();
+    store->last = last;
+    dataset::Dataset data = data_;
+    for (dataset::FrameEntry& frame : data.frames)
+      for (auto& image : frame.images)
+        image = image_files::ImageFile{
+            .path = {}, .time_ns = image->time_ns, .store = store, .entry = store->add(image->path)};
+    ExportRequest undistort = request(Format::kColmap, "colmap");
+    undistort.undistort = true;
+    undistort.data = &data;
+    undistort.interrupted = store->source.get_token();
+    const auto report = export_map(map_, undistort);
+    ASSERT_FALSE(report);
+    EXPECT_EQ(report.error().message(), "interrupted; nothing is written");
+    EXPECT_EQ(store->reads, last);
+    for (const auto& entry : fs::directory_iterator(folder_.path())) EXPECT_EQ(entry.path(), root());
+  }
+  std::stop_source source;
+  source.request_stop();
+  for (const FormatName& format : formats()) {
+    ExportRequest plain = request(format.format, std::string(format.name));
+    plain.interrupted = source.get_token();
+    EXPECT_FALSE(export_map(map_, plain)) << format.name;
+    EXPECT_FALSE(fs::exists(plain.out)) << format.name;
+  }
+}
+
 // The same cameras mounted differently are another rig of the map, whose names are taken: they become cam2 and cam3.
 TEST_F(MapExportFiles, TheRecordingOfAnAppendedRigIsFound) {
   std::vector<camera::RigCamera> cameras;

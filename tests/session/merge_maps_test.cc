@@ -179,6 +179,14 @@ TEST(MergeMaps, RejectsAMapWithoutVisualWords) {
   EXPECT_EQ(merged_runs().vocabulary, looping::small_vocabulary()->id());
 }
 
+TEST(MergeMaps, EndsAtAnInterruption) {
+  std::stop_source source;
+  source.request_stop();
+  const auto result = merge_maps(runs(), looping::small_vocabulary(), {}, source.get_token());
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().message(), "interrupted; nothing is written");
+}
+
 TEST(TransferTrajectory, FollowsTheKeyframesOfTheRun) {
   const SavedMap site = saved(merged_runs().map, "site"), &own = runs()[0];
   const evaluation::Trajectory keyframes = storage::keyframe_trajectory(own.map, storage::submaps_of(own.map)[0]);
