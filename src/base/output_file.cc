@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <map>
 #include <system_error>
 
 #include "base/atomic_file.h"
@@ -14,6 +15,17 @@ bool begins_with(const std::filesystem::path& file, std::string_view text) {
   std::ifstream stream(file, std::ios::binary);
   stream.read(begin.data(), static_cast<std::streamsize>(begin.size()));
   return stream.gcount() == 0 || begin.substr(0, static_cast<std::size_t>(stream.gcount())) == text;
+}
+
+// The name of a file that may not exist, without links.
+std::filesystem::path real_name(const std::filesystem::path& file) {
+  constexpr int kMaxLinks = 40;  // as in the kernel
+  std::error_code error;
+  std::filesystem::path end = std::filesystem::absolute(file);
+  for (int links = 0; links < kMaxLinks && std::filesystem::is_symlink(end, error); ++links)
+    end = end.parent_path() / std::filesystem::read_symlink(end, error);
+  const std::filesystem::path real = std::filesystem::weakly_canonical(end, error);
+  return error ? end.lexically_normal() : real;
 }
 
 }  // namespace
@@ -40,6 +52,17 @@ Status check_not_input(const std::string& file, const char* option, const std::v
   };
   if (std::ranges::none_of(inputs, is_file)) return {};
   return Error{file, option, "a file that this command reads", "another name"};
+}
+
+Status check_distinct(const std::vector<OutputFile>& outputs) {
+  std::map<std::filesystem::path, const char*> options;
+  for (const OutputFile& output : outputs) {
+    if (output.file.empty()) continue;
+    const auto [same, is_new] = options.try_emplace(real_name(output.file), output.option);
+    if (!is_new)
+      return Error{output.file.string(), output.option, std::string("the file of ") + same->second, "another name"};
+  }
+  return {};
 }
 
 }  // namespace bslam

@@ -18,4 +18,13 @@ Status check_output_file(const std::string& file, const char* option, bool overw
 // inputs are ignored.
 Status check_not_input(const std::string& file, const char* option, const std::vector<std::filesystem::path>& inputs);
 
+// A file that a command writes, with the option that names it. Without a name it is not written.
+struct OutputFile {
+  const char* option;
+  std::filesystem::path file;
+};
+
+// Checks that no two files to be written, which need not exist, are the same one, also under other names.
+Status check_distinct(const std::vector<OutputFile>& outputs);
+
 }  // namespace bslam

@@ -271,7 +271,8 @@ int live(const LiveArguments& a) {
   if (!rig) return report_error(rig.error());
   const auto request = stream_request(a);
   if (!request) return report_error(request.error());
-  for (const Status& s : {check_settings_of_cameras(a, rig->paths), check_recording(a), check_outputs(a.slam)}) {
+  for (const Status& s : {check_settings_of_cameras(a, rig->paths), check_recording(a),
+                          check_outputs(a.slam, {{"--record", a.record}})}) {
     if (!s) return report_error(s.error());
   }
   const bool quiet = log_verbosity(a.slam.log_level) < LogVerbosity::kWarning;

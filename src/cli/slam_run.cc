@@ -11,7 +11,6 @@
 
 #include "base/atomic_file.h"
 #include "base/option_table.h"
-#include "base/output_file.h"
 #include "cli/allocation_count.h"
 #include "cli/print_message.h"
 #include "cli/rerun.h"
@@ -50,6 +49,19 @@ Status check_folder(const SlamArguments& arguments) {
   if (!arguments.overwrite && !std::filesystem::is_empty(folder, error))
     return Error{folder.string(), "--out", "a folder that is not empty", "an empty or new folder, or --overwrite"};
   return check_writable(folder / "summary.json");
+}
+
+// Checks that the files beside the results in the folder of the run are neither each other, nor that folder, nor one of
+// the results.
+Status check_names(std::vector<OutputFile> files, const std::filesystem::path& folder) {
+  for (const OutputFile& output : files) {
+    if (!session::is_result_file(output.file.filename().string())) continue;
+    const std::filesystem::path result = folder / output.file.filename();
+    if (!check_distinct({{"--out", result}, output}))
+      return Error{output.file.string(), output.option, "the name of a result of the run", "another name"};
+  }
+  files.push_back({"--out", folder});
+  return check_distinct(files);
 }
 
 // Creates the output folder, and moves the results of an earlier run aside, except for those that this run reads.
@@ -234,9 +246,13 @@ Result<system::Config> resolve_run_config(const SlamArguments& arguments) {
   return resolved;
 }
 
-Status check_outputs(const SlamArguments& arguments) {
+Status check_outputs(const SlamArguments& arguments, std::vector<OutputFile> further) {
   if (const Status s = check_folder(arguments); !s) return s;
   const bool writes_rerun = !is_viewer(arguments.rerun);
+  further.insert(further.end(), {{"--save-map", arguments.save_map},
+                                 {"--journal", arguments.journal},
+                                 {"--rerun", writes_rerun ? arguments.rerun : ""}});
+  if (const Status s = check_names(std::move(further), arguments.out); !s) return s;
   for (const auto& [option, file, begin] : {std::tuple("--save-map", arguments.save_map, "BSLAMMAP"),
                                             std::tuple("--journal", arguments.journal, "bslam-journal"),
                                             std::tuple("--rerun", writes_rerun ? arguments.rerun : "", "RRF")}) {

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "base/output_file.h"
 #include "cli/config_arguments.h"
 #include "cli/run_log.h"
 #include "cli/view_arguments.h"
@@ -41,8 +42,8 @@ std::string command_of(std::span<const char* const> command_line);
 Result<system::Config> resolve_run_config(const SlamArguments& arguments);
 
 // Checks before the run, without leaving anything, whether all its output can be written: folder, map, journal, and the
-// file or viewer of --rerun.
-Status check_outputs(const SlamArguments& arguments);
+// file or viewer of --rerun. They must be different files, also from the `further` ones.
+Status check_outputs(const SlamArguments& arguments, std::vector<OutputFile> further = {});
 
 // The input of a run besides its command-line arguments.
 struct RunInput {

@@ -38,5 +38,18 @@ TEST(OutputFile, IsNoInputUnderAnyName) {
   EXPECT_TRUE(check_not_input(folder.path() / "new", "--out", {input, folder.path() / "missing"}));
 }
 
+TEST(OutputFile, IsNoOtherOutputUnderAnyName) {
+  const support::TemporaryFolder folder;
+  const fs::path map = folder.path() / "map", link = folder.path() / "link", other = folder.path() / "other";
+  fs::create_symlink("map", link);  // which does not exist yet
+  EXPECT_TRUE(check_distinct({{"--map", map}, {"--out", other}, {"--none", ""}, {"--neither", ""}}));
+  for (const fs::path& file : {map, link, folder.path() / "x" / ".." / "map"}) {
+    const Status status = check_distinct({{"--map", map}, {"--out", other}, {"--journal", file}});
+    ASSERT_FALSE(status) << file;
+    EXPECT_EQ(status.error().key, "--journal");
+    EXPECT_EQ(status.error().found, "the file of --map");
+  }
+}
+
 }  // namespace
 }  // namespace bslam

@@ -78,6 +78,19 @@ TEST_F(CommandLine, AnOutputReplacesNeitherItsInputNorAFileOfAnotherKind) {
   EXPECT_EQ(read_text(notes), "precious");
 }
 
+TEST_F(CommandLine, EveryOutputOfARunHasItsOwnFile) {
+  const std::string base = "run " + data() + " --out " + out("own") + " ", file = out("both");
+  for (const auto& [arguments, message] :
+       {std::pair("--save-map " + file + " --journal " + file, "--journal: found the file of --save-map"),
+        std::pair("--save-map " + out("own"), "--out: found the file of --save-map"),
+        std::pair("--journal " + out("own/summary.json"), "--journal: found the name of a result of the run")}) {
+    const Ran ran = run(base + arguments);
+    EXPECT_EQ(ran.status, 2) << arguments;
+    EXPECT_NE(ran.err.find(message), std::string::npos) << arguments << ": " << ran.err;
+    EXPECT_FALSE(fs::exists(out("own"))) << arguments;
+  }
+}
+
 // The times of KITTI poses, and the calibration in a folder.
 TEST_F(CommandLine, AnOutputDoesNotReplaceAnInputThatIsNotNamed) {
   const std::string poses = out("kitti/poses.txt"), times = out("kitti/times.txt"), rig = out("same.yaml");
