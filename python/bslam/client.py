@@ -18,6 +18,9 @@ from typing import Any, Union
 import numpy as np
 from numpy.typing import NDArray
 
+# The usual port of each kind of address; without a scheme that of `bslam serve`.
+_PORTS = {"": 8090, "http": 80, "https": 443}
+
 # Pixels as (height, width) uint8, an encoded image, or the file of one.
 Image = Union[NDArray[np.uint8], bytes, str, "os.PathLike[str]"]
 
@@ -99,14 +102,18 @@ class Client:
         """Does not connect yet.
 
         Args:
-            address: as the server prints it, such as "http://127.0.0.1:8090".
+            address: as the server prints it, such as "http://127.0.0.1:8090"; or that of a proxy before it, such as
+                "https://robot.example/map". The port is 80 for http://, 443 for https://, and 8090 without either,
+                unless it is given.
             token: that of the option --token.
             timeout: seconds without progress after which a request fails.
         """
-        parts = urllib.parse.urlsplit(address if "://" in address else f"http://{address}")
-        if parts.scheme != "http" or not parts.hostname:
+        parts = urllib.parse.urlsplit(address if "://" in address else f"//{address}")
+        if parts.scheme not in _PORTS or not parts.hostname:
             raise ValueError(f"address: found {address!r}, expected one such as 'http://127.0.0.1:8090'")
-        self._host, self._port, self._timeout = parts.hostname, parts.port or 8090, timeout
+        self._encrypted = parts.scheme == "https"
+        self._host, self._port, self._timeout = parts.hostname, parts.port or _PORTS[parts.scheme], timeout
+        self._folder = parts.path.rstrip("/")
         self._headers = {"Authorization": f"Bearer {token}"} if token else {}
 
     def localise(self, images: Mapping[str, Image]) -> Localisation:
@@ -142,13 +149,15 @@ class Client:
         return self._request("GET", "/metrics").decode()
 
     def _request(self, method: str, path: str, body: bytes = b"", headers: Mapping[str, str] | None = None) -> bytes:
-        connection = http.client.HTTPConnection(self._host, self._port, timeout=self._timeout)
+        kind = http.client.HTTPSConnection if self._encrypted else http.client.HTTPConnection
+        connection = kind(self._host, self._port, timeout=self._timeout)
         try:
-            connection.request(method, path, body, {**self._headers, **(headers or {})})
+            connection.request(method, self._folder + path, body, {**self._headers, **(headers or {})})
             response = connection.getresponse()
             answer = response.read()
         except (OSError, http.client.HTTPException) as error:
-            raise ServiceError(f"http://{self._host}:{self._port}: {error}") from error
+            scheme = "https" if self._encrypted else "http"
+            raise ServiceError(f"{scheme}://{self._host}:{self._port}: {error}") from error
         finally:
             connection.close()
         if response.status == 200:
