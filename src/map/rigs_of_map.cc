@@ -102,6 +102,46 @@ std::vector<std::size_t> sizes_of_rigs(const BundledMap& map) {
   return out;
 }
 
+using Cameras = std::vector<std::optional<std::size_t>>;
+
+// The rig of a map, with its calibration as it was given or as it is.
+struct PartOfMap {
+  const camera::Rig& names;  // with the names that the cameras were given
+  camera::Rig rig;
+};
+
+bool may_be_same(const PartOfMap& part, std::size_t c, const camera::Rig& rig, std::size_t i) {
+  return same_camera(part.rig.camera(c), rig.camera(i)) && !names_another(part.names, c, rig.camera(i).name) &&
+         !names_another(rig, i, part.names.camera(c).name);
+}
+
+// The cameras of `rig` that those of the part are if camera `c` is camera `i`.
+Cameras cameras_with(const PartOfMap& part, std::size_t c, const camera::Rig& rig, std::size_t i) {
+  Cameras out(part.rig.size());
+  for (std::size_t d = 0; d < out.size(); ++d) {
+    const geometry::SE3 T_d_c = part.rig.cam_from_rig(d) * part.rig.rig_from_cam(c);
+    for (std::size_t j = 0; j < rig.size() && !out[d]; ++j) {
+      const bool taken = std::ranges::count(out, std::optional(j)) > 0;
+      if (!taken && may_be_same(part, d, rig, j) && same_pose(T_d_c, rig.cam_from_rig(j) * rig.rig_from_cam(i)))
+        out[d] = j;
+    }
+  }
+  return out;
+}
+
+// Empty if the part and `rig` are different rigs.
+Cameras same_cameras(const PartOfMap& part, const camera::Rig& rig) {
+  const auto smaller = static_cast<std::ptrdiff_t>(std::min(part.rig.size(), rig.size()));
+  for (std::size_t c = 0; c < part.rig.size(); ++c) {
+    for (std::size_t i = 0; i < rig.size(); ++i) {
+      if (!may_be_same(part, c, rig, i)) continue;
+      Cameras found = cameras_with(part, c, rig, i);
+      if (std::ranges::count_if(found, [](const auto& camera) { return camera.has_value(); }) == smaller) return found;
+    }
+  }
+  return {};
+}
+
 }  // namespace
 
 void BundledMap::append_cameras(std::shared_ptr<const camera::Rig> rig, std::shared_ptr<const camera::Rig> given) {
@@ -137,6 +177,18 @@ std::vector<CameraIndex> find_or_append_rigs(BundledMap& map, const BundledMap& 
     const auto found = find_rig(map, given);
     const std::size_t first = found ? *found : append_rig(map, given, cameras_of(other.rig(), out.size(), size));
     for (std::size_t i = 0; i < size; ++i) out.emplace_back(first + i);
+  }
+  return out;
+}
+
+std::vector<std::optional<std::size_t>> find_cameras(const BundledMap& map, const camera::Rig& rig) {
+  Cameras out;
+  for (const std::size_t size : sizes_of_rigs(map)) {
+    const camera::Rig given = cameras_of(map.given_rig(), out.size(), size);
+    Cameras found = same_cameras({given, given}, rig);
+    if (found.empty()) found = same_cameras({given, cameras_of(map.rig(), out.size(), size)}, rig);
+    found.resize(size);
+    out.insert(out.end(), found.begin(), found.end());
   }
   return out;
 }

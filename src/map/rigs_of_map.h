@@ -24,6 +24,11 @@ std::size_t find_or_append_rig(BundledMap& map, const camera::Rig& rig);
 // `other` that of `map`. The cameras of a keyframe keep their order.
 std::vector<CameraIndex> find_or_append_rigs(BundledMap& map, const BundledMap& other);
 
+// For each camera of the map, the camera of `rig` that it is, if there is one. All cameras of its rig in the map, or
+// all of `rig` if these are fewer, must have the same calibration, or that which they had before a run refined it, and
+// the same arrangement in both; names tell cameras apart that have the same calibration.
+std::vector<std::optional<std::size_t>> find_cameras(const BundledMap& map, const camera::Rig& rig);
+
 // For each camera of the map, the first camera of its rig.
 std::vector<std::size_t> first_cameras_of_rigs(const BundledMap& map);
 

@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <iterator>
+#include <numeric>
+
+#include "map/rigs_of_map.h"
 
 namespace bslam::map_export {
 namespace {
@@ -53,7 +56,10 @@ class Writer {
         images_(images),
         cameras_(cameras),
         colours_(colours),
-        rigid_(rigid) {}
+        rigid_(rigid),
+        first_(map::first_cameras_of_rigs(map_)) {
+    if (!rigid) std::iota(first_.begin(), first_.end(), std::size_t{0});
+  }
 
   ColmapModel write() {
     model_.rigs =
@@ -73,16 +79,22 @@ class Writer {
 
  private:
   void write_cameras_and_rigs() {
-    const std::size_t n = map_.rig().size();
-    std::string sensors;
-    for (std::size_t c = 0; c < n; ++c) {
+    for (std::size_t c = 0; c < map_.rig().size(); ++c) {
       model_.cameras += fmt::format("{} {}\n", c + 1, camera_text(cameras_.camera(c)));
-      if (!rigid_) model_.rigs += fmt::format("{0} 1 CAMERA {0}\n", c + 1);
-      if (c == 0) continue;
-      const SE3 T_cam_cam0 = map_.rig().cam_from_rig(c) * map_.rig().rig_from_cam(0);
-      sensors += fmt::format(" CAMERA {} 1 {}", c + 1, pose_text(T_cam_cam0));
+      if (first_[c] == c) write_rig(c);
     }
-    if (rigid_) model_.rigs += fmt::format("1 {} CAMERA 1{}\n", n, sensors);
+  }
+
+  // Writes the rig with this first camera, whose number it has.
+  void write_rig(std::size_t first) {
+    const camera::Rig& rig = map_.rig();
+    std::string sensors;
+    std::size_t end = first + 1;
+    for (; end < rig.size() && first_[end] == first; ++end) {
+      const SE3 T_cam_first = rig.cam_from_rig(end) * rig.rig_from_cam(first);
+      sensors += fmt::format(" CAMERA {} 1 {}", end + 1, pose_text(T_cam_first));
+    }
+    model_.rigs += fmt::format("{0} {1} CAMERA {0}{2}\n", first + 1, end - first, sensors);
   }
 
   void write_frames() {
@@ -93,15 +105,17 @@ class Writer {
     }
     for (const KeyframeId k : selection_.keyframes) {
       std::string data;
-      std::size_t count = 0;
+      std::size_t count = 0, first = 0;
       for (std::size_t c = 0; c < map_.rig().size(); ++c) {
         if (images_.of(k, c) < 0) continue;
         data += fmt::format(" CAMERA {} {}", c + 1, images_.of(k, c) + 1);
+        first = first_[c];
         ++count;
       }
       if (count > 0 && rigid_)
-        model_.frames += fmt::format("{} 1 {} {}{}\n", k.value() + 1,
-                                     pose_text(map_.rig().cam_from_rig(0) * map_.keyframe(k).T_rig_world), count, data);
+        model_.frames +=
+            fmt::format("{} {} {} {}{}\n", k.value() + 1, first + 1,
+                        pose_text(map_.rig().cam_from_rig(first) * map_.keyframe(k).T_rig_world), count, data);
     }
   }
 
@@ -166,6 +180,7 @@ class Writer {
   const OutputCameras& cameras_;
   const LandmarkColours& colours_;
   const bool rigid_;
+  std::vector<std::size_t> first_;  // for each camera, the first one of its rig in COLMAP
   ColmapModel model_;
   std::vector<std::vector<int>> place_;  // per image and keypoint; -1: not in the model
   double error_sum_ = 0;

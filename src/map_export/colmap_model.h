@@ -20,9 +20,9 @@ struct ColmapModel {
 
 // The model has one image with its keypoints for each entry of `images`, and a point for every landmark. 0.5 is added
 // to pixel coordinates, since the origin is the corner of the top-left pixel in COLMAP and its centre in bslam. The
-// cameras are one rig, and the images of a keyframe one frame; but a rig of its own for each camera if images of a
-// keyframe were captured at times so different that a rigid rig does not explain them. Error (file left empty) if
-// COLMAP does not have the model of a camera.
+// cameras of each rig of the map are one rig, and the images of a keyframe one frame; but a rig of its own for each
+// camera if images of a keyframe were captured at times so different that a rigid rig does not explain them. Error
+// (file left empty) if COLMAP does not have the model of a camera.
 Result<ColmapModel> colmap_model(const Selection& selection, const ImageTable& images, const OutputCameras& cameras,
                                  const LandmarkColours& colours);
 

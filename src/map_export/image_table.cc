@@ -44,16 +44,17 @@ std::filesystem::path below_folder(const std::filesystem::path& path) {
   return out;
 }
 
-// The images of each camera of the map by their time stamps in ns. If the cameras of the recording are one of the rigs
-// of the map, these are its cameras. Otherwise they are recognised by their names, and, if a name is unknown and the
-// numbers of cameras are equal, by their numbers.
+// The images of each camera of the map by their time stamps in ns. The cameras of the recording are those of each rig
+// of the map with their calibrations. If there is none, they are recognised by their names, and, if a name is unknown
+// and the numbers of cameras are equal, by their numbers.
 class RecordedImages {
  public:
   RecordedImages(const map::BundledMap& map, const dataset::Dataset& data) : by_time_(map.rig().size()) {
-    const std::optional<std::size_t> first = map::find_rig(map, data.rig);
-    for (std::size_t c = 0; c < by_time_.size(); ++c) {  // c - first wraps for cameras before the rig
-      const std::size_t recorded = first ? c - *first : camera_of(map.rig(), c, data.rig);
-      if (recorded < data.rig.size()) collect(data, recorded, by_time_[c]);
+    std::vector<std::optional<std::size_t>> recorded = map::find_cameras(map, data.rig);
+    const bool known = std::ranges::any_of(recorded, [](const auto& camera) { return camera.has_value(); });
+    for (std::size_t c = 0; c < by_time_.size(); ++c) {
+      if (!known) recorded[c] = camera_of(map.rig(), c, data.rig);
+      if (recorded[c]) collect(data, *recorded[c], by_time_[c]);
     }
   }
 
@@ -64,11 +65,11 @@ class RecordedImages {
   }
 
  private:
-  static std::size_t camera_of(const camera::Rig& rig, std::size_t camera, const camera::Rig& recorded) {
+  static std::optional<std::size_t> camera_of(const camera::Rig& rig, std::size_t camera, const camera::Rig& recorded) {
     for (std::size_t c = 0; c < recorded.size(); ++c) {
       if (recorded.camera(c).name == rig.camera(camera).name) return c;
     }
-    return rig.size() == recorded.size() ? camera : recorded.size();
+    return rig.size() == recorded.size() ? std::optional(camera) : std::nullopt;
   }
 
   static void collect(const dataset::Dataset& data, std::size_t camera, std::map<TimeNs, RecordedImage>& images) {

@@ -1,4 +1,5 @@
 // Exports as files: point clouds, nerfstudio, undistorted images and colours of a recording.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <array>
@@ -9,6 +10,7 @@
 #include <tuple>
 
 #include "map/rigs_of_map.h"
+#include "map_export/colmap_model.h"
 #include "map_export/export_map.h"
 #include "map_export/exported_map.h"
 #include "map_export/nerfstudio.h"
@@ -381,6 +383,33 @@ TEST_F(MapExportFiles, TheRecordingOfAnAppendedRigIsFound) {
       EXPECT_EQ(image.keyframe == added, own == first);
     }
   }
+}
+
+// A run with one camera of a recording, continued by a run with another one: two rigs, whose cameras may be alike.
+TEST_F(MapExportFiles, AllRigsOfARecordingFindTheirImagesAndAreRigsOfColmap) {
+  const camera::Rig rig = synthetic::ring_rig(2);
+  map::BundledMap map = storage::small_map(rig.subset(std::array{0}));
+  ASSERT_EQ(map::find_or_append_rig(map, rig.subset(std::array{1})), 1u);
+  const KeyframeId last = select_submap(map, 0).value().keyframes.back();
+  frame::BundledFrame frame = *map.keyframe(last).frame;
+  std::swap(frame.cameras[0], frame.cameras[1]);
+  frame.bundled = frame::Bundled(std::array<std::size_t, 2>{0, frame.cameras[1].keypoints.size()}, {}, {});
+  map.add_keyframe(std::make_shared<const frame::BundledFrame>(std::move(frame)), map.keyframe(last).T_rig_world, {},
+                   last);
+  const Selection selection = select_submap(map, 0).value();
+  const ImageTable images(selection, &data_, root());
+  EXPECT_EQ(images.found(), images.images().size());
+  std::size_t right = 0;
+  for (const MapImage& image : images.images()) {
+    EXPECT_TRUE(image.name.starts_with(image.camera == 0 ? "left/" : "right/")) << image.name;
+    right += image.camera;
+  }
+  EXPECT_EQ(right, 1u);
+  const OutputCameras cameras(map.rig(), false);
+  const auto model = colmap_model(selection, images, cameras, landmark_colours(selection, images));
+  ASSERT_TRUE(model) << model.error().message();
+  EXPECT_TRUE(model->rigs.ends_with("\n1 1 CAMERA 1\n2 1 CAMERA 2\n")) << model->rigs;
+  EXPECT_NE(model->frames.find(fmt::format("\n{} 2 ", map.keyframe_slots())), std::string::npos) << model->frames;
 }
 
 TEST_F(MapExportFiles, NamesFromFilesCannotLeadOutOfTheFolderOrBreakLines) {

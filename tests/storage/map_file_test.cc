@@ -377,6 +377,27 @@ TEST(MapFile, ACameraIsNotAnotherOneOfTheSameCalibration) {
   const map::BundledMap map = small_map(stereo);
   EXPECT_EQ(map::find_rig(map, stereo.subset(std::vector<int>{0})), 0u);
   EXPECT_FALSE(map::find_rig(map, stereo.subset(std::vector<int>{1})));
+  const auto found = map::find_cameras(map, stereo.subset(std::vector<int>{1}));
+  EXPECT_EQ(found, (std::vector<std::optional<std::size_t>>{std::nullopt, 0}));
+}
+
+// A map of some cameras of a recording, or a recording with some cameras of a map, in another order.
+TEST(MapFile, KnowsWhichCamerasOfItAreThoseOfARecording) {
+  using Cameras = std::vector<std::optional<std::size_t>>;
+  const camera::Rig ring = synthetic::ring_rig(4);
+  const auto part = [&ring](const std::vector<int>& cameras) { return ring.subset(cameras); };
+  map::BundledMap map = small_map(ring);
+  EXPECT_EQ(map::find_cameras(map, part({2, 0})), (Cameras{1, {}, 0, {}}));
+  map = small_map(part({0, 2}));
+  EXPECT_EQ(map::find_cameras(map, ring), (Cameras{0, 2}));
+  EXPECT_EQ(map::find_rig(map, part({3, 1})), std::nullopt);
+  map::find_or_append_rig(map, part({3, 1}));
+  EXPECT_EQ(map::find_cameras(map, ring), (Cameras{0, 2, 3, 1}));
+  EXPECT_EQ(map::find_cameras(map, synthetic::fisheye_rig(4)), Cameras(4));
+  const camera::Rig moved = changed(ring, 2, [](camera::RigCamera& c) {
+    c.T_body_cam = c.T_body_cam * geometry::SE3(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.1, 0, 0));
+  });
+  EXPECT_EQ(map::find_cameras(map, moved), (Cameras{{}, {}, 3, 1}));
 }
 
 // Distances between cameras are in metres, and mean nothing in a map with a unit of its own.
