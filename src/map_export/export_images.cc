@@ -33,12 +33,13 @@ std::string counts(const Exporter& exporter) {
                      exporter.selection.landmarks.size());
 }
 
-Status write_keyframes(const Exporter& exporter, const AtomicFolder& folder) {
+Status write_keyframes(Exporter& exporter, const AtomicFolder& folder) {
   const std::string header = evaluation::trajectory_header("cam0", evaluation::PoseState::kFinal);
   const std::vector<storage::Submap> submaps = storage::submaps_of(exporter.map());
   for (std::size_t i = 0; i < submaps.size(); ++i) {
     const std::string name = submaps.size() == 1 ? "keyframes.tum" : fmt::format("keyframes_{}.tum", i);
     const auto trajectory = storage::keyframe_trajectory(exporter.map(), submaps[i]);
+    exporter.note_equal_times(submaps[i].keyframes.size(), trajectory.size(), name);
     if (Status s = folder.write(name, evaluation::tum_text(trajectory, header)); !s) return s;
   }
   return {};

@@ -113,6 +113,12 @@ LandmarkColours Exporter::colours() {
   return colours;
 }
 
+void Exporter::note_equal_times(std::size_t keyframes, std::size_t poses, const std::string& file) {
+  if (poses < keyframes)
+    note(fmt::format("{} of {} keyframes have the time of another one, and are not in {}", keyframes - poses, keyframes,
+                     file));
+}
+
 Status export_ply(Exporter& exporter) {
   const LandmarkColours colours = exporter.colours();
   if (Status s = not_interrupted(exporter.request.interrupted); !s) return s;

@@ -30,10 +30,11 @@ std::string axes_text(const Exporter& exporter) {
 }
 
 // Poses of camera 0 in the frame of the map server, as a file of the format TUM.
-std::string keyframes_text(const Exporter& exporter) {
+std::string keyframes_text(Exporter& exporter) {
   storage::Submap submap;
   submap.keyframes = exporter.selection.keyframes;
   evaluation::Trajectory trajectory = storage::keyframe_trajectory(exporter.map(), submap);
+  exporter.note_equal_times(submap.keyframes.size(), trajectory.size(), "keyframes.tum");
   for (evaluation::TimedPose& pose : trajectory)
     pose.T_world_frame = exporter.selection.T_upright_world * pose.T_world_frame;
   return evaluation::tum_text(trajectory, evaluation::trajectory_header("cam0", evaluation::PoseState::kFinal, "map"));

@@ -4,9 +4,12 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 #include <utility>
 
+#include "image_decoding/image_file.h"
 #include "map/rigs_of_map.h"
+#include "map_export/shown_keypoints.h"
 
 namespace bslam::map_export {
 namespace {
@@ -44,17 +47,23 @@ std::filesystem::path below_folder(const std::filesystem::path& path) {
   return out;
 }
 
+image_decoding::PixelFormat format_of(const dataset::Dataset& data, std::size_t camera) {
+  return camera < data.pixel_formats.size() ? data.pixel_formats[camera] : image_decoding::PixelFormat();
+}
+
 // The images of each camera of the map by their time stamps in ns. The cameras of the recording are those of each rig
 // of the map with their calibrations. If there is none, they are recognised by their names, and, if a name is unknown
 // and the numbers of cameras are equal, by their numbers.
 class RecordedImages {
  public:
-  RecordedImages(const map::BundledMap& map, const dataset::Dataset& data) : by_time_(map.rig().size()) {
-    std::vector<std::optional<std::size_t>> recorded = map::find_cameras(map, data.rig);
+  // `data`: null if there is no recording.
+  RecordedImages(const map::BundledMap& map, const dataset::Dataset* data) : by_time_(map.rig().size()) {
+    if (!data) return;
+    std::vector<std::optional<std::size_t>> recorded = map::find_cameras(map, data->rig);
     const bool known = std::ranges::any_of(recorded, [](const auto& camera) { return camera.has_value(); });
     for (std::size_t c = 0; c < by_time_.size(); ++c) {
-      if (!known) recorded[c] = camera_of(map.rig(), c, data.rig);
-      if (recorded[c]) collect(data, *recorded[c], by_time_[c]);
+      if (!known) recorded[c] = camera_of(map.rig(), c, data->rig);
+      if (recorded[c]) collect(*data, *recorded[c], by_time_[c]);
     }
   }
 
@@ -83,33 +92,73 @@ class RecordedImages {
   std::vector<std::map<TimeNs, RecordedImage>> by_time_;
 };
 
+// Whether an image of the recording was found for two images of the map, because these are of several recordings with
+// the same time stamps.
+bool any_twice(std::vector<const RecordedImage*> found) {
+  std::erase(found, nullptr);
+  std::ranges::sort(found);
+  return std::ranges::adjacent_find(found) != found.end();
+}
+
+// Of several recordings with the same time stamps: keeps what was found for the images of the map which show the
+// keypoints of their keyframes, and each image only once.
+void keep_shown(const map::BundledMap& map, const dataset::Dataset& data, const std::vector<MapImage>& images,
+                std::vector<const RecordedImage*>& found) {
+  std::set<const RecordedImage*> taken;
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    if (!found[i]) continue;
+    const auto pixels = image_decoding::read_image(*found[i]->image, format_of(data, found[i]->camera));
+    const camera::Camera& camera = map.rig().camera(images[i].camera);
+    const bool same = pixels && pixels->width() == camera.width && pixels->height() == camera.height &&
+                      shows(*pixels, map.keypoints(images[i].keyframe, CameraIndex(images[i].camera)), map.pyramid());
+    if (!same || !taken.insert(found[i]).second) found[i] = nullptr;
+  }
+}
+
+// Adds numbers to names that occur several times, but not to those of images that are in the recording.
+void make_unique(std::vector<MapImage>& images) {
+  std::set<std::string> names;
+  for (const bool recorded : {true, false}) {
+    for (MapImage& image : images) {
+      if (image.recorded.has_value() != recorded) continue;
+      const std::filesystem::path path = image.name;
+      for (int i = 2; !names.insert(image.name).second; ++i) {
+        const std::string name = fmt::format("{}_{}{}", path.stem().string(), i, path.extension().string());
+        image.name = (path.parent_path() / name).string();
+      }
+    }
+  }
+}
+
 }  // namespace
 
 ImageTable::ImageTable(const Selection& selection, const dataset::Dataset* data, const std::filesystem::path& root)
     : cameras_(selection.map->rig().size()), number_(selection.map->keyframe_slots() * cameras_, -1) {
   const camera::Rig& rig = selection.map->rig();
-  const std::optional<RecordedImages> recorded =
-      data ? std::optional(RecordedImages(*selection.map, *data)) : std::nullopt;
+  const RecordedImages recorded(*selection.map, data);
   const std::vector<std::string> folders = folders_of(rig);
+  std::vector<const RecordedImage*> found;
   for (const KeyframeId k : selection.keyframes) {
     const frame::BundledFrame& frame = *selection.map->keyframe(k).frame;
     for (std::size_t c = 0; c < cameras_; ++c) {
       if (frame.cameras[c].state != image::ImageState::kPresent) continue;
       const TimeNs stamp_ns = frame.cameras[c].time_ns - rig.camera(c).time_offset_ns;
-      MapImage image{k, c, fmt::format("{}/{}.png", folders[c], stamp_ns), {}, {}};
-      const RecordedImage* found = recorded ? recorded->at(c, stamp_ns) : nullptr;
-      if (found) {
-        image.recorded = *found->image;
-        const std::filesystem::path& path = found->image->path;
-        const std::string file = path.empty() ? std::string() : path.lexically_relative(root).string();
-        if (!file.empty()) image.name = without_control_characters(file);
-        if (found->camera < data->pixel_formats.size()) image.format = data->pixel_formats[found->camera];
-        ++found_;
-      }
       number_[k.index() * cameras_ + c] = static_cast<int>(images_.size());
-      images_.push_back(std::move(image));
+      images_.push_back({k, c, fmt::format("{}/{}.png", folders[c], stamp_ns), {}, {}});
+      found.push_back(recorded.at(c, stamp_ns));
     }
   }
+  if (any_twice(found)) keep_shown(*selection.map, *data, images_, found);
+  for (std::size_t i = 0; i < images_.size(); ++i) {
+    if (!found[i]) continue;
+    const std::filesystem::path& path = found[i]->image->path;
+    const std::string file = path.empty() ? std::string() : path.lexically_relative(root).string();
+    if (!file.empty()) images_[i].name = without_control_characters(file);
+    images_[i].recorded = *found[i]->image;
+    images_[i].format = format_of(*data, found[i]->camera);
+    ++found_;
+  }
+  make_unique(images_);
 }
 
 void ImageTable::keep(const std::vector<std::uint8_t>& kept) {
@@ -124,6 +173,7 @@ void ImageTable::keep(const std::vector<std::uint8_t>& kept) {
 
 void ImageTable::set_extensions(const std::string& extension) {
   for (MapImage& image : images_) image.name = below_folder(image.name).replace_extension(extension).string();
+  make_unique(images_);
 }
 
 }  // namespace bslam::map_export

@@ -21,6 +21,8 @@ struct Exporter {
   void note_upward() {
     if (!request.up) note(upward_note());
   }
+  // Notes keyframes that are not in the trajectory of all that was written to this file, since times must increase.
+  void note_equal_times(std::size_t keyframes, std::size_t poses, const std::string& file);
   // The colours of the landmarks; notes if they are grey because there are no images.
   LandmarkColours colours();
 };
