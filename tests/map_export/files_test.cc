@@ -242,7 +242,9 @@ TEST_F(MapExportFiles, ModelsOfUndistortedImagesContainTheWrittenOnesOnly) {
     EXPECT_TRUE(fs::exists(folder_.path() / "nerf" / frame["file_path"].get<std::string>())) << frame["file_path"];
   fs::remove_all(root());
   undistort.overwrite = true;
-  EXPECT_EQ(export_map(map_, undistort).error().found, "no image of the map that can be read");
+  const auto unreadable = export_map(map_, undistort);
+  ASSERT_FALSE(unreadable);
+  EXPECT_EQ(unreadable.error().found, "no image of the map that can be read");
 }
 
 TEST_F(MapExportFiles, PathsOfNerfstudioLeadFromItsFolderToTheRecording) {
