@@ -43,6 +43,14 @@ double baseline(const map::BundledMap& map, View a, View b) {
   return (centre(a) - centre(b)).norm();
 }
 
+// The longest way of a camera between two keyframes. If the rig turns about one camera, the others move.
+double longest_way(const map::BundledMap& map, KeyframeId a, KeyframeId b) {
+  double longest = 0;
+  for (std::size_t c = 0; c < map.rig().size(); ++c)
+    longest = std::max(longest, baseline(map, {a, CameraIndex(c)}, {b, CameraIndex(c)}));
+  return longest;
+}
+
 // Returns true if camera b observes enough of the points that camera a observes at a depth of about `depth` metres.
 bool shares_view(const map::BundledMap& map, View a, View b, double depth) {
   const feature::Keypoints& keypoints = map.keypoints(a.keyframe, a.camera);
@@ -139,6 +147,7 @@ int create_landmarks(KeyframeId keyframe, const CreationOptions& options, const 
   int made = 0;
   for (const map::Covisible& neighbour :
        draft.map().best_covisible(keyframe, static_cast<std::size_t>(options.neighbours))) {
+    if (longest_way(draft.map(), keyframe, neighbour.keyframe) < options.min_baseline_over_depth * depth) continue;
     for (std::size_t i = 0; i < draft.map().rig().size(); ++i) {
       for (std::size_t j = 0; j < draft.map().rig().size(); ++j) {
         made += create_between({keyframe, CameraIndex(i)}, {neighbour.keyframe, CameraIndex(j)}, depth, options,

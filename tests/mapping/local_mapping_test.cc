@@ -93,6 +93,25 @@ TEST(CreateLandmarks, CreatesNoneWithoutABaseline) {
   EXPECT_EQ(create_landmarks(KeyframeId(1), {}, kFeatures, draft), 0);
 }
 
+// Camera 0 stays at its place, but the others move.
+TEST(CreateLandmarks, CreatesLandmarksWhileTheRigTurnsAboutCamera0) {
+  const camera::Rig ring = synthetic::ring_rig(4);
+  std::vector<camera::RigCamera> cameras;
+  for (std::size_t c = 0; c < ring.size(); ++c)
+    cameras.push_back({ring.camera(c), ring.body_from_cam(0).inverse() * ring.body_from_cam(c)});
+  std::vector<synthetic::ControlPose> control;
+  for (int i = 0; i < 6; ++i) control.push_back({{0.3, 0.2, 1.5}, 0.4 * i, 0.0, 0.0});
+  synthetic::FeatureSimulatorOptions options;
+  options.landmarks = 3000;
+  options.max_keypoints = 700;
+  SimulatedMap world(
+      synthetic::FeatureSimulator(camera::Rig(std::move(cameras)), synthetic::Trajectory(control, 1.0), options));
+  for (int i = 0; i < 3; ++i) world.add_keyframe(FrameId(i), 0.5 * i, false);
+  ASSERT_LT(map::distance_m(world.true_pose(KeyframeId(0)), world.true_pose(KeyframeId(2))), 1e-9);
+  map::MapDraft draft = world.draft();
+  EXPECT_GT(create_landmarks(KeyframeId(2), {}, kFeatures, draft), 20);
+}
+
 TEST(CreateLandmarks, CreatesAtMostOneLandmarkPerFeature) {
   const SimulatedMap world = stereo_map(synthetic::ring_rig(3), 4);
   map::MapDraft draft = world.draft();
