@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "calibration/rig_warnings.h"
+#include "camera/model_parameters.h"
 
 namespace bslam::session {
 namespace {
@@ -75,6 +76,40 @@ void warn_of_wrong_focal_length(const camera::Camera& camera, const calibration:
   }
 }
 
+// The distance by which the change of the distortion or shape parameters alone moves the pixels at the corners of the
+// images, at most.
+double change_of_distortion_px(const camera::Camera& camera, const calibration::CameraRefinement& estimate) {
+  camera::ModelParameters changed = camera::parameters(camera.model);
+  if (estimate.intrinsics.size() != static_cast<std::size_t>(changed.size())) return 0;
+  for (Eigen::Index k = 4; k < changed.size(); ++k)
+    changed(k) += estimate.intrinsics[static_cast<std::size_t>(k)].change;
+  camera::Camera other = camera;
+  other.model = camera::with_parameters(camera.model, changed);
+  double farthest = 0;
+  for (const double x : {0.0, camera.width - 1.0}) {
+    for (const double y : {0.0, camera.height - 1.0}) {
+      const auto ray = camera.unproject({x, y});
+      const auto moved = ray ? other.project(*ray) : std::nullopt;
+      if (moved) farthest = std::max(farthest, (*moved - Eigen::Vector2d(x, y)).norm());
+    }
+  }
+  return farthest;
+}
+
+// Warns if the distortion changed by much more than errors of usual calibrations, as if the images had been
+// undistorted.
+void warn_of_distortion(const camera::Camera& camera, const calibration::CameraRefinement& estimate,
+                        Warnings& warnings) {
+  constexpr double kFar = 0.08;  // relative to the image width
+  const double change_px = change_of_distortion_px(camera, estimate);
+  if (change_px < kFar * camera.width) return;
+  warn(
+      warnings,
+      "{}: the estimated distortion differs from the calibration by {:.0f} px in the corners of the images: check that "
+      "the calibration belongs to these images, which may have been undistorted or rectified",
+      camera.name, change_px);
+}
+
 // Warns if the images contradict the times of a camera.
 void warn_of_timing(const std::string& name, const calibration::CameraRefinement& camera, Warnings& warnings) {
   if (camera.time_offset.refined) {
@@ -121,6 +156,7 @@ void warn_of_estimate(const RunRecord& record, const camera::Rig& rig, Warnings&
     if (contradicted) {
       warn_of_intrinsics(rig.camera(c), calibration.estimate.cameras[c], warnings);
       warn_of_wrong_focal_length(rig.camera(c), calibration.estimate.cameras[c], warnings);
+      warn_of_distortion(rig.camera(c), calibration.estimate.cameras[c], warnings);
     }
     warn_of_timing(record.cameras[c].name, calibration.estimate.cameras[c], warnings);
   }

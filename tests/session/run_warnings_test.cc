@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "camera/model_parameters.h"
 #include "synthetic/rigs.h"
 
 namespace bslam::session {
@@ -27,6 +28,25 @@ TEST(RunWarnings, AFocalLengthThatIsFarOffIsSaid) {
     const std::vector<std::string> warnings = warnings_after_run(record, rig, "");
     EXPECT_TRUE(has_text(warnings, "estimated intrinsics differ"));
     EXPECT_EQ(has_text(warnings, "the focal length seems to be wrong by 7 %"), change > 0.05);
+  }
+}
+
+// Undistorted images with the calibration of the distorted ones.
+TEST(RunWarnings, ADistortionThatIsFarOffIsSaid) {
+  const camera::Rig rig = synthetic::ring_rig(2);
+  const camera::ModelParameters given = camera::parameters(rig.camera(0).model);
+  ASSERT_LT(given(4), -0.1);  // k1
+  for (const bool undistorted : {false, true}) {
+    RunRecord record;
+    record.complete = true;
+    record.cameras.resize(rig.size());
+    record.calibration.estimate.verdict = calibration::Verdict::kInconsistent;
+    record.calibration.estimate.cameras.resize(rig.size());
+    for (const std::string& name : camera::parameter_names(rig.camera(0).model))
+      record.calibration.estimate.cameras[0].intrinsics.push_back({.name = name, .std = 0.001});
+    record.calibration.estimate.cameras[0].intrinsics[4].change = undistorted ? -given(4) : 0.02;
+    const std::vector<std::string> warnings = warnings_after_run(record, rig, "");
+    EXPECT_EQ(has_text(warnings, "the estimated distortion differs"), undistorted);
   }
 }
 
