@@ -39,7 +39,7 @@ PairsWithoutMap pairs_without_map(const dataset::Dataset& dataset) {
   if (!tested) return out;
   for (const calibration::PairEvidence& pair : *tested) {
     out.as_given += pair.verdict == calibration::Convention::kAsGiven;
-    if (!calibration::shows_another_arrangement(pair)) continue;
+    if (!calibration::shows_another_arrangement(pair) && !pair.mirrored) continue;
     out.contradicted.push_back(
         {.first = pair.first, .second = pair.second, .overlap = pair.overlap, .evidence = pair, .contradicted = true});
   }

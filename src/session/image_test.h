@@ -18,9 +18,9 @@ Result<std::vector<calibration::PairEvidence>> test_against_images(const dataset
 // with some frames spread over it that follow each other.
 std::optional<calibration::LateCamera> late_camera(const dataset::Dataset& dataset);
 
-// The result of testing a calibration against some images, if no map was started with it.
+// The result of testing a calibration against some images, if no map was started with it or most frames were lost.
 struct PairsWithoutMap {
-  // Pairs whose images show another arrangement of the cameras; without keyframes.
+  // Pairs whose images show another arrangement of the cameras, or of which one has mirrored images; without keyframes.
   std::vector<calibration::CameraPair> contradicted;
   int as_given = 0;  // number of pairs whose images agree with the calibration
 };

@@ -109,6 +109,9 @@ void add_calibration(const RecordInput& input, RunRecord& record) {
     PairsWithoutMap found = pairs_without_map(input.dataset);
     calibration.pairs = std::move(found.contradicted);
     calibration.pairs_as_given = found.as_given;
+  } else if (input.complete && mostly_lost(record)) {
+    PairsWithoutMap found = pairs_without_map(input.dataset);
+    if (!found.contradicted.empty()) calibration.pairs = std::move(found.contradicted);
   }
   for (std::size_t c = 0; c < record.cameras.size(); ++c) {
     if (inconsistent_fraction(record.cameras[c]) > 0.5) calibration.disagreeing.push_back(c);

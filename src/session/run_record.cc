@@ -114,6 +114,16 @@ bool never_started(const RunRecord& record) {
          std::ranges::any_of(record.frames, had_images);
 }
 
+bool mostly_lost(const RunRecord& record) {
+  if (record.cameras.size() < 2 || record.map.loaded) return false;
+  const auto unexplained = [](const RunFrame& frame) {
+    if (frame.outcome() != FrameOutcome::kLost) return false;
+    const tracking::LostReason reason = frame.record->final_result().reason;
+    return reason != tracking::LostReason::kNoImages && reason != tracking::LostReason::kFewFeatures;
+  };
+  return std::ranges::count_if(record.frames, unexplained) > count(record, FrameOutcome::kTracked);
+}
+
 bool interrupted_at_once(const RunRecord& record) { return !record.complete && record.frames.empty(); }
 
 std::int64_t frames_in_loaded_map(const RunRecord& record) {

@@ -201,6 +201,8 @@ std::vector<ContestedInterval> contested_intervals(const RunRecord& record);
 
 // Whether the images of several cameras could be used, but no map was started with them.
 bool never_started(const RunRecord& record);
+// Whether several cameras found no pose for most frames although there were images with features.
+bool mostly_lost(const RunRecord& record);
 
 // Whether the run was interrupted before its first frame: it has no results that could replace those of an earlier one.
 bool interrupted_at_once(const RunRecord& record);

@@ -178,14 +178,7 @@ void warn_of_losses(const RunRecord& record, const std::string& check_command, W
     shown += fmt::format(" and {} more intervals, see summary.json", intervals.size() - kShown);
   const std::int64_t lost = count(record, FrameOutcome::kLost);
   warn(warnings, "{} of {} frames have no pose: {}", lost, record.frames.size(), shown);
-  const auto unexplained = std::ranges::count_if(record.frames, [](const RunFrame& frame) {
-    if (frame.outcome() != FrameOutcome::kLost) return false;
-    const tracking::LostReason reason = frame.record->final_result().reason;
-    return reason != tracking::LostReason::kNoImages && reason != tracking::LostReason::kFewFeatures;
-  });
-  if (record.cameras.size() < 2 || record.map.loaded || record.calibration.foreign_images() ||
-      unexplained <= count(record, FrameOutcome::kTracked))
-    return;
+  if (!mostly_lost(record) || record.calibration.foreign_images()) return;
   if (record.calibration.verdict() == calibration::Verdict::kConsistent) {
     warn(warnings,
          "most frames have no pose, but where there are poses the images agree with the calibration: too little light "
@@ -265,7 +258,8 @@ std::vector<calibration::CameraPair>::const_iterator most_contradicted(
 // Warns of pairs of cameras that should see the same things but do not.
 void warn_of_pairs(const RunRecord& record, const std::string& check_command, Warnings& warnings) {
   if (const std::string foreign = foreign_images_text(record); !foreign.empty()) {
-    const bool mirrored = most_contradicted(record.calibration.pairs)->mirrored();
+    const calibration::CameraPair& pair = *most_contradicted(record.calibration.pairs);
+    const bool mirrored = pair.mirrored() || pair.evidence->mirrored;
     return warn(warnings, "{}. {} ({})", foreign,
                 mirrored ? "Turn off the mirroring of the cameras or of their driver"
                          : "Check which images are of which camera, and the direction of the transforms",
@@ -318,6 +312,23 @@ void warn_of_load(const RunRecord& record, Warnings& warnings) {
   if (dropped > 0) warn(warnings, "{} frames dropped: processing is slower than real time", dropped);
 }
 
+std::string what_is_foreign(const RunRecord& record, const calibration::CameraPair& pair) {
+  const std::string names = fmt::format("{} and {}", record.cameras[pair.first].name, record.cameras[pair.second].name);
+  if (pair.mirrored() && pair.keyframes > 0)
+    return fmt::format("the images are mirrored left to right, so poses, scale and map are wrong: of cameras {},",
+                       names);
+  if (pair.keyframes > 0) {
+    return fmt::format(
+        "the images do not belong to the calibration, so poses, scale and map are wrong: cameras {} share {:.1f} % of "
+        "the features in their common view;",
+        names, 100 * pair.matched_share());
+  }
+  if (never_started(record))
+    return fmt::format("the images do not belong to the calibration, so no map was started: of cameras {}", names);
+  return fmt::format("the images do not belong to the calibration, so poses, scale and map are wrong: of cameras {}",
+                     names);
+}
+
 }  // namespace
 
 std::string foreign_images_text(const RunRecord& record) {
@@ -325,19 +336,7 @@ std::string foreign_images_text(const RunRecord& record) {
   const auto best = most_contradicted(pairs);
   if (best == pairs.end() || !best->contradicted) return {};
   const auto others = std::ranges::count(pairs, true, &calibration::CameraPair::contradicted) - 1;
-  const std::string names =
-      fmt::format("{} and {}", record.cameras[best->first].name, record.cameras[best->second].name);
-  const std::string shown =
-      best->mirrored() && best->keyframes > 0
-          ? fmt::format("the images are mirrored left to right, so poses, scale and map are wrong: of cameras {},",
-                        names)
-      : best->keyframes == 0
-          ? fmt::format("the images do not belong to the calibration, so no map was started: of cameras {}", names)
-          : fmt::format(
-                "the images do not belong to the calibration, so poses, scale and map are wrong: cameras {} "
-                "share {:.1f} % of the features in their common view;",
-                names, 100 * best->matched_share());
-  return fmt::format("{} {}{}", shown, calibration::describe_pair(*best->evidence),
+  return fmt::format("{} {}{}", what_is_foreign(record, *best), calibration::describe_pair(*best->evidence),
                      others > 0 ? fmt::format(" (and {} more pairs)", others) : "");
 }
 

@@ -61,6 +61,22 @@ TEST(RunWarnings, ACameraThatIsOneFrameLateIsNamedFirst) {
       << warnings[0];
 }
 
+// Some images of a run that has hardly any pose were tested.
+TEST(RunWarnings, AMirroredCameraIsNamedIfMostFramesAreLost) {
+  RunRecord record;
+  record.complete = true;
+  record.maps_started = 1;
+  record.cameras.resize(2);
+  record.cameras[0].name = "left";
+  record.cameras[1].name = "right";
+  calibration::PairEvidence evidence{.first = 0, .second = 1, .matches = 500};
+  evidence.mirrored = calibration::MirroredCamera{1, 480, 450};
+  record.calibration.pairs = {{.first = 0, .second = 1, .overlap = 0.8, .evidence = evidence, .contradicted = true}};
+  const std::vector<std::string> warnings = warnings_after_run(record, synthetic::default_rig(), "");
+  EXPECT_TRUE(has_text(warnings, "so poses, scale and map are wrong: of cameras left and right 450 of 480 matches"));
+  EXPECT_TRUE(has_text(warnings, "Turn off the mirroring"));
+}
+
 // The estimate is made with images of different times.
 TEST(RunWarnings, WithALateCameraNoEstimateIsOffered) {
   RunRecord record;
