@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include "mapping/create_landmarks.h"
 #include "mapping/cull.h"
@@ -12,8 +13,7 @@
 namespace bslam::mapping {
 namespace {
 
-// Maximum relative standard deviation of the scales of a metric map's older submaps.
-constexpr double kMaxOtherDeviation = 0.1;
+constexpr double kMaxOtherDeviation = 0.1;  // see max_deviation_of_others
 
 // What map_keyframe() passes to its steps.
 struct Mapping {
@@ -40,16 +40,27 @@ ScaleReport adjust_with_scale(KeyframeId keyframe, const Mapping& mapping, map::
   return scale;
 }
 
-// Estimates the scales of all submaps but that of the keyframe. Returns the largest of their deviations, 0 if there are
-// no other submaps, and infinity if some scale is not observable.
+// Maximum deviation of the scales of a metric map's older submaps, which may be too short for an accurate one.
+double max_deviation_of_others(const ScaleOptions& options) {
+  return std::max(kMaxOtherDeviation, options.max_deviation);
+}
+
+// Estimates the scales of all submaps but that of the keyframe, if all are accurate enough. Returns the largest of
+// their deviations, 0 if there are no other submaps, and infinity if some scale is not.
 double scale_others(KeyframeId keyframe, const Mapping& mapping, map::MapDraft& draft) {
-  double deviation = 0;
+  std::vector<KeyframeId> newest;  // of each submap
   for (const KeyframeId root : draft.map().roots()) {
-    if (root == draft.map().root_of(keyframe)) continue;
-    const ScaleReport scale =
-        adjust_with_scale(std::ranges::max(draft.map().keyframes_of_submap(root)), mapping, draft);
-    deviation = std::max(deviation, scale.observed ? scale.deviation : std::numeric_limits<double>::infinity());
+    if (root != draft.map().root_of(keyframe))
+      newest.push_back(std::ranges::max(draft.map().keyframes_of_submap(root)));
   }
+  const auto is_accurate = [&](KeyframeId k) {
+    map::MapDraft trial = draft;
+    const ScaleReport scale = observe_scale(k, mapping.options.scale, mapping.features, trial);
+    return scale.observed && scale.deviation <= max_deviation_of_others(mapping.options.scale);
+  };
+  if (!std::ranges::all_of(newest, is_accurate)) return std::numeric_limits<double>::infinity();
+  double deviation = 0;
+  for (const KeyframeId k : newest) deviation = std::max(deviation, adjust_with_scale(k, mapping, draft).deviation);
   return deviation;
 }
 
@@ -59,9 +70,8 @@ void adjust_locally(KeyframeId keyframe, const Mapping& mapping, map::MapDraft& 
   const double deviation_before = metric ? std::numeric_limits<double>::infinity() : draft.map().scale_deviation();
   const ScaleReport scale = adjust_with_scale(keyframe, mapping, draft);
   if (!is_metric(scale, deviation_before, mapping.options.scale)) return;
-  // The scale is a property of the whole map. Other submaps may be too short for an accurate one.
-  const double of_others = scale_others(keyframe, mapping, draft);
-  const bool known = of_others <= std::max(kMaxOtherDeviation, mapping.options.scale.max_deviation);
+  const double of_others = scale_others(keyframe, mapping, draft);  // the scale is a property of the whole map
+  const bool known = of_others <= max_deviation_of_others(mapping.options.scale);
   draft.set_scale(known ? map::Scale::kMetric : map::Scale::kUnobservable,
                   known ? std::max(scale.deviation, of_others) : scale.deviation);
 }
