@@ -224,8 +224,8 @@ void merge_submaps(const LoopClosure& closure, const PlaceMatch& place_match, co
   const KeyframeId moving = here_moves ? here : there;
   const double factor = here_moves ? place_match.scale : 1 / place_match.scale;
   if (map.scale() != map::Scale::kMetric) draft.scale_submap(moving, factor);
-  const SE3 T_here_place = here_moves ? place_match.T_rig_world : geometry::scaled(place_match.T_rig_world, factor);
-  const SE3 T_there_here = T_here_place.inverse() * map.keyframe(closure.keyframe).T_rig_world;
+  const SE3 T_rig_there = here_moves ? place_match.T_rig_world : geometry::scaled(place_match.T_rig_world, factor);
+  const SE3 T_there_here = T_rig_there.inverse() * map.keyframe(closure.keyframe).T_rig_world;
   const SE3 motion = here_moves ? T_there_here : T_there_here.inverse();
 
   map::SetPoses poses;
