@@ -58,3 +58,10 @@ Trajectory to_trajectory(const evaluation::Trajectory& cam0, const std::optional
 }
 
 }  // namespace bslam::api
+
+std::string_view bslam::to_string(Scale scale) {
+  for (const auto& [outer, inner] : api::kScales) {
+    if (outer == scale) return map::scale_name(inner);
+  }
+  return "";
+}

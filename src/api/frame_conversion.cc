@@ -107,3 +107,10 @@ FrameResult to_frame_result(const tracking::FrameRecord& record, const camera::R
 }
 
 }  // namespace bslam::api
+
+std::string_view bslam::to_string(CameraState state) {
+  for (const auto& [outer, inner] : api::kCameraStates) {
+    if (outer == state) return tracking::describe(inner);
+  }
+  return "";
+}

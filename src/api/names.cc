@@ -1,4 +1,5 @@
-// Text for the enumerators of the public headers, and the version of the library.
+// Text for the enumerators of the public headers that have none in the estimator, and the version of the library. The
+// others are beside their conversions.
 #include <bslam/bslam.h>
 
 namespace bslam {
@@ -33,30 +34,6 @@ std::string_view to_string(LostReason reason) {
       return "unstable-pose";
     case LostReason::kNotFound:
       return "not-found";
-  }
-  return "";
-}
-
-std::string_view to_string(CameraState state) {
-  switch (state) {
-    case CameraState::kOk:
-      return "ok";
-    case CameraState::kDegraded:
-      return "degraded";
-    case CameraState::kOut:
-      return "out";
-  }
-  return "";
-}
-
-std::string_view to_string(Scale scale) {
-  switch (scale) {
-    case Scale::kMetric:
-      return "metric";
-    case Scale::kUpToScale:
-      return "up-to-scale";
-    case Scale::kUnobservable:
-      return "unobservable";
   }
   return "";
 }

@@ -105,13 +105,10 @@ void add_calibration(const RecordInput& input, RunRecord& record) {
                                               input.system.rig(), suspected);
   std::erase_if(calibration.pairs,
                 [](const calibration::CameraPair& p) { return !p.contradicted && !p.hardly_matched(); });
-  if (input.complete && never_started(record)) {
-    PairsWithoutMap found = pairs_without_map(input.dataset);
-    calibration.pairs = std::move(found.contradicted);
-    calibration.pairs_as_given = found.as_given;
-  } else if (input.complete && mostly_lost(record)) {
+  if (input.complete && (never_started(record) || mostly_lost(record))) {
     PairsWithoutMap found = pairs_without_map(input.dataset);
     if (!found.contradicted.empty()) calibration.pairs = std::move(found.contradicted);
+    calibration.pairs_as_given = found.as_given;
   }
   for (std::size_t c = 0; c < record.cameras.size(); ++c) {
     if (inconsistent_fraction(record.cameras[c]) > 0.5) calibration.disagreeing.push_back(c);
