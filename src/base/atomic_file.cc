@@ -8,6 +8,7 @@
 #include <cerrno>
 #include <utility>
 
+#include "base/behind_links.h"
 #include "base/file_descriptor.h"
 
 namespace bslam {
@@ -43,30 +44,20 @@ Status check_replaceable(const std::filesystem::path& path) {
   return Error{path.string(), "", "something other than a regular file", "a regular file or a new name"};
 }
 
-// The file at the end of symbolic links, which may not exist yet: it is replaced, and the links stay.
-Result<std::filesystem::path> behind_links(const std::filesystem::path& path) {
-  constexpr int kMaxLinks = 40;  // as in the kernel
-  std::filesystem::path end = path;
+// The file that is replaced: the one at the end of symbolic links, which stay.
+Result<std::filesystem::path> replaced_file(const std::filesystem::path& path) {
   std::error_code error;
-  for (int links = 0; std::filesystem::is_symlink(end, error); ++links) {
-    if (links < kMaxLinks) {
-      const std::filesystem::path next = std::filesystem::read_symlink(end, error);
-      end = end.parent_path() / next;  // `next` alone if it is absolute
-    } else {
-      error = std::make_error_code(std::errc::too_many_symbolic_link_levels);
-    }
-    if (!error) continue;
-    errno = error.value();
-    return system_error("write", path, kWritable);
-  }
-  return end;
+  std::filesystem::path end = behind_links(path, error);
+  if (!error) return end;
+  errno = error.value();
+  return system_error("write", path, kWritable);
 }
 
 }  // namespace
 
 Status check_writable(const std::filesystem::path& path) {
   if (Status replaceable = check_replaceable(path); !replaceable) return replaceable;
-  const auto target = behind_links(path);
+  const auto target = replaced_file(path);
   if (!target) return target.error();
   std::filesystem::path part;
   const FileDescriptor file(open_beside(*target, part));
@@ -81,7 +72,7 @@ Status write_atomically(const std::filesystem::path& path, std::string_view byte
 
 Status write_atomically(const std::filesystem::path& path, std::span<const std::string_view> pieces) {
   if (Status replaceable = check_replaceable(path); !replaceable) return replaceable;
-  const auto target = behind_links(path);
+  const auto target = replaced_file(path);
   if (!target) return target.error();
   std::filesystem::path part;
   FileDescriptor file(open_beside(*target, part));

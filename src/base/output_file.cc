@@ -6,6 +6,7 @@
 #include <system_error>
 
 #include "base/atomic_file.h"
+#include "base/behind_links.h"
 
 namespace bslam {
 namespace {
@@ -19,11 +20,8 @@ bool begins_with(const std::filesystem::path& file, std::string_view text) {
 
 // The name of a file that may not exist, without links.
 std::filesystem::path real_name(const std::filesystem::path& file) {
-  constexpr int kMaxLinks = 40;  // as in the kernel
   std::error_code error;
-  std::filesystem::path end = std::filesystem::absolute(file);
-  for (int links = 0; links < kMaxLinks && std::filesystem::is_symlink(end, error); ++links)
-    end = end.parent_path() / std::filesystem::read_symlink(end, error);
+  const std::filesystem::path end = behind_links(std::filesystem::absolute(file), error);
   const std::filesystem::path real = std::filesystem::weakly_canonical(end, error);
   return error ? end.lexically_normal() : real;
 }
