@@ -82,7 +82,8 @@ struct CalibrationRecord {
   double excess_bound = 0;  // the images contradict the calibration if estimate.excess_error is larger
   std::vector<calibration::CameraPair> pairs =
       {};  // pairs of cameras that are contradicted or hardly matched; without keyframes if no map was started
-  int pairs_as_given = 0;        // if no map was started or most frames were lost: pairs whose images agree with the calibration
+  int pairs_as_given =
+      0;  // if no map was started or most frames were lost: pairs whose images agree with the calibration
   bool scale_unfounded = false;  // the scale is not reliable: there are no two consistent cameras that determine it
   std::vector<std::size_t> disagreeing = {};  // cameras that were inconsistent for most of the run
   // Tested if the images contradict the calibration, or if a camera was inconsistent for some time.
