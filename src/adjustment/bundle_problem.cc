@@ -47,7 +47,8 @@ void add_landmark(const map::BundledMap& map, LandmarkId id, const std::vector<i
 }
 
 // Motion of the rig between each keyframe's time and the capture times of its images; empty if all images of all
-// keyframes were captured at the same time.
+// keyframes were captured at the same time, and no camera was moved. A move of a camera, T_after_before T_cam_rig, is
+// the motion T_cam_rig^-1 T_after_before T_cam_rig of the rig as this camera sees it.
 std::vector<geometry::SE3> motions(const map::BundledMap& map, const std::vector<KeyframeId>& keyframes) {
   std::vector<geometry::SE3> out;
   bool any = false;
@@ -55,6 +56,10 @@ std::vector<geometry::SE3> motions(const map::BundledMap& map, const std::vector
     for (std::size_t c = 0; c < map.rig().size(); ++c) {
       any |= map.keyframe(k).frame->delay_s(c) != 0.0;
       out.push_back(map.motion_until(k, CameraIndex(c)));
+      if (map.rig().moves().empty()) continue;
+      any = true;
+      out.back() =
+          map.rig().rig_from_cam(c) * map.rig().cam_from_rig_at(c, map.keyframe(k).frame->time_ns) * out.back();
     }
   }
   if (!any) out.clear();

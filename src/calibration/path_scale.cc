@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "base/assert.h"
 #include "calibration/rig_frame.h"
@@ -54,8 +55,11 @@ void keep_scale(const CalibrationOptions& options, RigRefinement& refinement) {
   if (!(std::abs(std::log(factor)) < tolerance)) return;
   solver::RigValues values = solver::RigValues::of(refinement.rig->in_frame_of_camera_0());
   for (geometry::SE3& T : values.T_cam_rig) T = geometry::scaled(T, factor);
+  std::vector<camera::CameraMove> moves(refinement.rig->moves().begin(), refinement.rig->moves().end());
+  for (camera::CameraMove& move : moves) move.T_after_before = geometry::scaled(move.T_after_before, factor);
   refinement.rig = with_rig_frame(values.applied_to(*refinement.rig), refinement.rig->cam_from_rig(0),
-                                  refinement.rig->body_from_rig());
+                                  refinement.rig->body_from_rig())
+                       .with_moves(std::move(moves));
   for (auto& [keyframe, T_rig_world] : refinement.poses.keyframes) T_rig_world = geometry::scaled(T_rig_world, factor);
   for (auto& [landmark, position] : refinement.poses.landmarks) position *= factor;
   refinement.scale_change = 1;

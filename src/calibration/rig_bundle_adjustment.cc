@@ -41,7 +41,7 @@ struct CalibrationBlocks {
 
 std::unique_ptr<solver::IntrinsicsBlock> make_intrinsics(const solver::RigValues& calibrated,
                                                          const RigAdjustmentOptions& options, double tighter) {
-  solver::IntrinsicPrior prior{{}, options.sigma_intrinsics, tighter * options.sigma_aspect};
+  solver::IntrinsicPrior prior{{}, options.sigma_intrinsics, tighter * options.sigma_aspect, options.shared};
   for (camera::ModelParameters& sigma : prior.sigmas) sigma *= tighter;
   for (const camera::CameraModel& model : calibrated.models) prior.values.push_back(camera::parameters(model));
   return std::make_unique<solver::IntrinsicsBlock>(std::move(prior));
@@ -53,7 +53,7 @@ std::unique_ptr<solver::TimingBlock> make_timing(const RigAdjustmentOptions& opt
     p.sigma_shift *= tighter;
     p.sigma_readout *= tighter;
   }
-  return std::make_unique<solver::TimingBlock>(std::move(prior));
+  return std::make_unique<solver::TimingBlock>(std::move(prior), options.shared);
 }
 
 solver::ExtrinsicPrior extrinsic_prior(const solver::RigValues& calibrated, const RigAdjustmentOptions& options,
@@ -116,6 +116,7 @@ void report_intrinsics(const Eigen::VectorXd& sigma, const solver::RigValues& ca
                        const RigAdjustmentOptions& options, RigAdjustment& out) {
   Eigen::Index at = 0;
   for (std::size_t c = 0; c < out.cameras.size(); ++c) {
+    if (!solver::has_own_unknowns(options.shared, c)) continue;
     CameraEstimate& camera = out.cameras[c];
     camera.intrinsics_change = camera::parameters(out.values.models[c]) - camera::parameters(calibrated.models[c]);
     const camera::ModelParameters relative =
@@ -131,6 +132,7 @@ void report_timing(const Eigen::VectorXd& sigma, const RigAdjustmentOptions& opt
   const double wider = 1.0 / std::sqrt(options.correlated_observations);
   Eigen::Index at = 0;
   for (std::size_t c = 0; c < out.cameras.size(); ++c) {
+    if (!solver::has_own_unknowns(options.shared, c)) continue;
     CameraEstimate& camera = out.cameras[c];
     const solver::TimingPrior& prior = options.timing[c];
     camera.timing_change = {out.values.timing[c].shift_s - prior.mean.shift_s,
@@ -166,8 +168,12 @@ Eigen::MatrixXd without_timing(const Eigen::MatrixXd& information, const Calibra
 Eigen::VectorXd physical_units(const RigAdjustmentOptions& options, Eigen::Index unknowns) {
   Eigen::VectorXd unit = Eigen::VectorXd::Ones(unknowns);
   Eigen::Index at = unknowns;
-  for (const camera::ModelParameters& sigma : options.sigma_intrinsics) at -= sigma.size();
-  for (const camera::ModelParameters& sigma : options.sigma_intrinsics) {
+  std::vector<camera::ModelParameters> sigmas;  // of the cameras with own intrinsics
+  for (std::size_t c = 0; c < options.sigma_intrinsics.size(); ++c) {
+    if (solver::has_own_unknowns(options.shared, c)) sigmas.push_back(options.sigma_intrinsics[c]);
+  }
+  for (const camera::ModelParameters& sigma : sigmas) at -= sigma.size();
+  for (const camera::ModelParameters& sigma : sigmas) {
     unit.segment(at, sigma.size()) = sigma.cwiseInverse() * std::sqrt(options.correlated_observations);
     at += sigma.size();
   }
@@ -308,6 +314,10 @@ RigAdjustment adjust_rig(solver::ReprojectionProblem& problem, const RigAdjustme
   CalibrationBlocks blocks = make_blocks(calibrated, options, {});
   if (blocks.size == 0) return out;
   if (start) state.rig = std::move(*start);
+  for (std::size_t c = 0; c < options.timing.size(); ++c) {  // constant times are those of the prior
+    if (options.timing[c].sigma_shift == 0) state.rig.timing[c].shift_s = options.timing[c].mean.shift_s;
+    if (options.timing[c].sigma_readout == 0) state.rig.timing[c].readout_s = options.timing[c].mean.readout_s;
+  }
   solver::ReprojectionProblem scaled = problem;
   std::vector<std::uint8_t> skipped, flagged(out.cameras.size(), 0);
   for (const Round& round : kRounds) {

@@ -27,6 +27,8 @@ struct RigAdjustmentOptions {
   double sigma_aspect = 0;  // relative standard deviation of fx / fy; 0: follows from sigma_intrinsics
   // Per camera; needs solver::ReprojectionProblem::twist. Empty: the timing is constant.
   std::vector<solver::TimingPrior> timing = {};
+  // Per camera: the camera whose intrinsics and timing it has (solver::SharedUnknowns).
+  solver::SharedUnknowns shared = {};
   // Number of observations that carry as much information as one independent observation. Errors of a landmark in
   // successive images are similar, so that the normal equations overestimate the information of the images.
   double correlated_observations = 1;

@@ -16,7 +16,8 @@ struct RigProblem {
 
 // Chooses keyframes and landmarks that are distributed over the map. Each group has its own gauge freedom: one keyframe
 // per group is fixed, which does not constrain the extrinsics. `timing`: the timing of the cameras is estimated, for
-// which only keyframes of known velocity are used. Here the rig frame is that of camera 0 (solver::RigValues).
+// which only keyframes of known velocity are used. Here the rig frame is that of camera 0 (solver::RigValues), and
+// moves of cameras are not part of the motions (MovedCameras::separate).
 RigProblem choose(const map::BundledMap& map, bool timing, const CalibrationOptions& options,
                   const feature::FeatureModel& features);
 

@@ -5,12 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "adjustment/landmark_noise.h"
-#include "calibration/lost_observations.h"
+#include "calibration/calibration_prior.h"
 #include "calibration/path_scale.h"
-#include "calibration/rig_bundle_adjustment.h"
+#include "calibration/rig_estimate.h"
 #include "calibration/rig_frame.h"
-#include "calibration/rig_problem.h"
 #include "calibration/single_view_landmarks.h"
 #include "calibration/unobserved_cameras.h"
 
@@ -21,27 +19,6 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 constexpr double kMillimetresPerMetre = 1000.0, kMillisecondsPerSecond = 1000.0;
-// Maximum number of adjustments. Before each one but the first, rejected observations are searched for again.
-constexpr int kPasses = 4;
-// Relative decrease of the cost at which preliminary adjustments stop. The sum of squared errors of 10,000 observations
-// then changes by about one; since correlated observations count less, the parameters are within a fraction of a
-// standard deviation of the optimum, which does not change a decision.
-constexpr double kCoarseDecrease = 1e-4;
-constexpr int kQuickKeyframes = 40, kQuickLandmarks = 1000;  // enough for a verdict
-
-// The options for an estimate from a fraction of the map.
-CalibrationOptions quick(CalibrationOptions options) {
-  options.keyframes = std::min(options.keyframes, kQuickKeyframes);
-  options.landmarks = std::min(options.landmarks, kQuickLandmarks);
-  return options;
-}
-
-// Options of an adjustment from which only the verdict is used: coarser convergence, no effects on the poses.
-RigAdjustmentOptions for_verdict(RigAdjustmentOptions options) {
-  options.relative_decrease = kCoarseDecrease;
-  options.pose_effects = false;
-  return options;
-}
 
 // Square root of the largest eigenvalue.
 double largest_deviation(const Matrix3d& covariance) {
@@ -51,13 +28,6 @@ double largest_deviation(const Matrix3d& covariance) {
 
 double mahalanobis_distance(const Vector3d& change, const Matrix3d& covariance) {
   return std::sqrt(change.dot(covariance.llt().solve(change)));
-}
-
-// The size of a rig: the longest distance of a camera from camera 0.
-double longest_baseline(const camera::Rig& rig) {
-  double longest = 0;
-  for (std::size_t c = 1; c < rig.size(); ++c) longest = std::max(longest, rig.cam_from_rig(c).translation().norm());
-  return longest;
 }
 
 std::vector<ParameterRefinement> evaluate_intrinsics(const CameraEstimate& estimate, const camera::CameraModel& model) {
@@ -84,121 +54,6 @@ void evaluate_extrinsics(const CameraEstimate& estimate, const CalibrationOption
                 (out.translation_sigmas > options.suspect_sigmas && out.change_mm > options.suspect_mm);
 }
 
-// Returns true if no extrinsics have moved from `before` by more than their own uncertainty.
-bool converged(const RigAdjustment& adjusted, const solver::RigValues& before) {
-  for (std::size_t c = 1; c < before.T_cam_rig.size(); ++c) {
-    const geometry::Vector6d change = solver::extrinsic_change(adjusted.values.T_cam_rig[c], before.T_cam_rig[c]);
-    if (change.dot(adjusted.cameras[c].covariance.llt().solve(change)) > static_cast<double>(change.size()))
-      return false;
-  }
-  return true;
-}
-
-// Adjusts again with the variance of each landmark (adjustment/landmark_noise.h), from the estimate `from`.
-RigAdjustment adjust_weighted(RigAdjustmentOptions options, RigAdjustment from, RigProblem& problem,
-                              const std::stop_token& stop) {
-  solver::ReprojectionProblem& flat = problem.flat.problem;
-  const auto chi2 = solver::squared_errors(flat, flat.T_rig_world, flat.points, from.values);
-  adjustment::apply_variances(adjustment::landmark_variances(flat, chi2, solver::beyond(chi2, solver::kChi2TwoDof95)),
-                              flat);
-  options.start_is_estimate = true;
-  RigAdjustment out = adjust_rig(flat, options, from.values, stop);
-  if (!out.done) return from;
-  out.scale_change *= from.scale_change;
-  return out;
-}
-
-// A map built with a wrong calibration contains mostly the observations that agree with it, so adjusting it once stops
-// short of the truth. Therefore the rejected observations are searched again with the new calibration.
-RigAdjustment adjust_in_passes(const map::BundledMap& map, const feature::FeatureModel& features,
-                               const RigAdjustmentOptions& options, RigProblem& problem, const std::stop_token& stop) {
-  RigAdjustmentOptions coarse = options;
-  coarse.relative_decrease = kCoarseDecrease;
-  solver::RigValues before = solver::RigValues::of(map.rig().in_frame_of_camera_0());
-  separate_groups(problem);
-  RigAdjustment out = adjust_rig(problem.flat.problem, coarse, before, stop);
-  for (int pass = 1; pass < kPasses && out.done && !converged(out, before); ++pass) {
-    before = out.values;
-    if (recover_observations(map, before.applied_to(map.rig()), features, problem.flat) == 0) break;
-    separate_groups(problem);
-    RigAdjustment again = adjust_rig(problem.flat.problem, coarse, before, stop);
-    if (!again.done) break;
-    again.scale_change *= out.scale_change;
-    out = std::move(again);
-  }
-  return out.done ? adjust_weighted(options, std::move(out), problem, stop) : out;
-}
-
-RigAdjustmentOptions prior_without_timing(const camera::Rig& rig, const CalibrationOptions& options) {
-  RigAdjustmentOptions out{.sigma_rotation = geometry::radians(options.sigma_rotation_deg),
-                           .sigma_translation = translation_deviation(rig, options),
-                           .sigma_depth = options.sigma_depth_mm / kMillimetresPerMetre,
-                           .sigma_scale = 0.01 * options.sigma_scale_percent,
-                           .sigma_aspect = 0.01 * options.sigma_aspect_percent,
-                           .correlated_observations = options.correlated_observations};
-  for (std::size_t c = 0; c < rig.size(); ++c) {
-    const camera::Camera& camera = rig.camera(c);
-    out.sigma_intrinsics.push_back(camera::typical_sigmas(camera.model, 0.01 * options.sigma_focal_percent,
-                                                          0.01 * options.sigma_centre_percent * camera.width));
-  }
-  return out;
-}
-
-// `rig` with the time offsets that were applied to the images of the map, and the frame of camera 0 as the rig frame.
-camera::Rig with_time_offsets_of(const camera::Rig& of_map, const camera::Rig& rig) {
-  std::vector<camera::RigCamera> cameras;
-  for (std::size_t c = 0; c < rig.size(); ++c) {
-    cameras.push_back({rig.camera(c), rig.body_from_cam(c)});
-    cameras.back().camera.time_offset_ns = of_map.camera(c).time_offset_ns;
-  }
-  return camera::Rig(std::move(cameras));
-}
-
-// Prior of the time offsets, relative to those applied to the images of the map, and of the readout times.
-std::vector<solver::TimingPrior> timing_prior(const camera::Rig& of_map, const camera::Rig& calibrated,
-                                              const CalibrationOptions& options) {
-  std::vector<solver::TimingPrior> out;
-  for (std::size_t c = 0; c < calibrated.size(); ++c) {
-    const camera::Camera& camera = calibrated.camera(c);
-    const double shift_s = to_seconds(camera.time_offset_ns - of_map.camera(c).time_offset_ns);
-    out.push_back({{shift_s, camera.readout_s},
-                   c == 0 ? 0.0 : options.sigma_time_offset_ms / kMillisecondsPerSecond,
-                   options.sigma_readout_ms / kMillisecondsPerSecond});
-  }
-  return out;
-}
-
-// Returns true if a time changed by more than `suspect_sigmas` standard deviations and `suspect_ms`.
-bool significant(double change_s, double sigma_s, const CalibrationOptions& options) {
-  return std::abs(change_s) > std::max(options.suspect_sigmas * sigma_s, options.suspect_ms / kMillisecondsPerSecond);
-}
-
-// Estimates all times from a fraction of the map, and returns the prior of those that the images contradict; empty if
-// there are none. All others are constant.
-std::vector<solver::TimingPrior> contradicted_timing(const map::BundledMap& map, const camera::Rig& reference,
-                                                     std::vector<solver::TimingPrior> timing,
-                                                     const CalibrationOptions& options,
-                                                     const feature::FeatureModel& features,
-                                                     const std::stop_token& stop) {
-  RigProblem problem = choose(map, true, quick(options), features);
-  problem.flat.problem.rig = &reference;
-  separate_groups(problem);
-  RigAdjustmentOptions with_timing = for_verdict(prior_without_timing(reference, options));
-  with_timing.timing = timing;
-  const auto adjusted =
-      adjust_rig(problem.flat.problem, with_timing, solver::RigValues::of(map.rig().in_frame_of_camera_0()), stop);
-  if (!adjusted.done) return {};
-  bool any = false;
-  for (std::size_t c = 0; c < timing.size(); ++c) {
-    const CameraEstimate& estimate = adjusted.cameras[c];
-    if (!significant(estimate.timing_change.shift_s, estimate.timing_sigma.shift_s, options)) timing[c].sigma_shift = 0;
-    if (!significant(estimate.timing_change.readout_s, estimate.timing_sigma.readout_s, options))
-      timing[c].sigma_readout = 0;
-    any |= timing[c].sigma_shift > 0 || timing[c].sigma_readout > 0;
-  }
-  return any ? timing : std::vector<solver::TimingPrior>{};
-}
-
 void evaluate_timing(const CameraEstimate& estimate, CameraRefinement& out) {
   const auto in_ms = [](double change_s, double sigma_s) {
     return TimeRefinement{kMillisecondsPerSecond * change_s, kMillisecondsPerSecond * sigma_s, sigma_s > 0};
@@ -219,11 +74,6 @@ map::SetPoses poses_of(const adjustment::BundleProblem& flat) {
 
 }  // namespace
 
-double translation_deviation(const camera::Rig& rig, const CalibrationOptions& options) {
-  return std::hypot(options.sigma_translation_mm / kMillimetresPerMetre,
-                    0.01 * options.sigma_translation_percent * longest_baseline(rig));
-}
-
 std::string_view verdict_name(Verdict verdict) {
   switch (verdict) {
     case Verdict::kUnknown:
@@ -243,54 +93,50 @@ bool can_refine(const map::BundledMap& map) {
   return map.rig().size() >= 2 && map.num_keyframes() > 0 && map.scale() == map::Scale::kMetric;
 }
 
-// The prior of all parameters that are estimated from the map.
-RigAdjustmentOptions prior_with_timing(const map::BundledMap& map, const camera::Rig& calibrated,
-                                       const CalibrationOptions& options, const feature::FeatureModel& features,
-                                       const std::stop_token& stop) {
-  RigAdjustmentOptions prior = prior_without_timing(calibrated, options);
-  prior.timing = contradicted_timing(map, with_time_offsets_of(map.rig(), calibrated),
-                                     timing_prior(map.rig(), calibrated, options), options, features, stop);
-  return prior;
+MovedCameras moves_of_map(const map::BundledMap& map) {
+  return {map.rig().size(), {map.rig().moves().begin(), map.rig().moves().end()}};
 }
 
-RigRefinement refine_with_prior(const map::BundledMap& map, const camera::Rig& calibrated,
-                                const RigAdjustmentOptions& prior, const CalibrationOptions& options,
-                                const feature::FeatureModel& features, const std::stop_token& stop) {
+// The change of the scale of the map, and its deviation.
+void evaluate_scale(const EstimateInput& input, const RigEstimate& estimate, RigRefinement& out) {
+  // If the path is longer than the longest baseline, the change of its length is the change of scale. Otherwise the
+  // scale is that of the baselines.
+  out.scale_change = estimate.adjusted.scale_change;
+  if (estimate.path_before <= longest_baseline(input.calibrated)) return;
+  out.scale_change = path_length(estimate.problem) / estimate.path_before;
+  if (!estimate.adjusted.pose_effects.empty())
+    out.scale_deviation = path_deviation(estimate.problem, estimate.adjusted.pose_effects) / estimate.path_before;
+}
+
+RigRefinement evaluate(const EstimateInput& input, RigEstimate&& estimate) {
   RigRefinement out;
-  const camera::Rig reference = with_time_offsets_of(map.rig(), calibrated);
-  RigProblem problem = choose(map, !prior.timing.empty(), options, features);
-  problem.flat.problem.rig = &reference;
-  out.keyframes = problem.flat.keyframes.size();
-  out.landmarks = problem.flat.landmarks.size();
-  const double path_before = path_length(problem);
-  RigAdjustment adjusted = adjust_in_passes(map, features, prior, problem, stop);
+  RigAdjustment& adjusted = estimate.adjusted;
+  out.keyframes = estimate.problem.flat.keyframes.size();
+  out.landmarks = estimate.problem.flat.landmarks.size();
   if (!adjusted.done) return out;
-  complete_unobserved_cameras(reference, adjusted);
+  complete_unobserved_cameras(*estimate.reference, adjusted);
   out.done = true;
-  for (std::size_t c = 0; c < map.rig().size(); ++c) {
+  for (std::size_t c = 0; c < input.map.rig().size(); ++c) {
     CameraRefinement& camera = out.cameras.emplace_back();
     camera.observed = adjusted.cameras[c].observed;
     camera.observations = adjusted.cameras[c].observations;
-    camera.intrinsics = evaluate_intrinsics(adjusted.cameras[c], calibrated.camera(c).model);
-    if (c > 0) evaluate_extrinsics(adjusted.cameras[c], options, camera);
+    camera.intrinsics = evaluate_intrinsics(adjusted.cameras[c], input.calibrated.camera(c).model);
+    if (c > 0) evaluate_extrinsics(adjusted.cameras[c], input.options, camera);
     evaluate_timing(adjusted.cameras[c], camera);
   }
+  out.moves = moves_of(estimate);
   out.excess_error = adjusted.excess_error;
-  out.verdict = out.excess_error > options.inconsistent_excess ? Verdict::kInconsistent : Verdict::kConsistent;
-  out.information = adjusted.information;
-  // If the path is longer than the longest baseline, the change of its length is the change of scale. Otherwise the
-  // scale is that of the baselines.
-  out.scale_change = adjusted.scale_change;
-  if (path_before > longest_baseline(calibrated)) {
-    out.scale_change = path_length(problem) / path_before;
-    if (!adjusted.pose_effects.empty())
-      out.scale_deviation = path_deviation(problem, adjusted.pose_effects) / path_before;
-  }
-  const camera::Rig refined = adjusted.values.applied_to(reference);
-  const geometry::SE3 T_cam0_rig = turn_of_rays(refined.camera(0), reference.camera(0)) * calibrated.cam_from_rig(0);
-  out.rig = with_rig_frame(refined, T_cam0_rig, calibrated.body_from_rig());
-  move_to_rig_frame(T_cam0_rig, map.rig().cam_from_rig(0), problem);
-  out.poses = poses_of(problem.flat);
+  out.verdict = out.excess_error > input.options.inconsistent_excess ? Verdict::kInconsistent : Verdict::kConsistent;
+  out.information = estimate.cameras.of_rig(adjusted.information);
+  evaluate_scale(input, estimate, out);
+  const std::vector<camera::CameraMove> moves = estimate.cameras.moves_of(adjusted.values);
+  const camera::Rig reference = with_time_offsets_of(input.map.rig(), input.calibrated);
+  const camera::Rig refined = estimate.cameras.of_rig(adjusted.values).applied_to(reference);
+  const geometry::SE3 T_cam0_rig =
+      turn_of_rays(refined.camera(0), reference.camera(0)) * input.calibrated.cam_from_rig(0);
+  out.rig = with_rig_frame(refined, T_cam0_rig, input.calibrated.body_from_rig()).with_moves(moves);
+  move_to_rig_frame(T_cam0_rig, input.map.rig().cam_from_rig(0), estimate.problem);
+  out.poses = poses_of(estimate.problem.flat);
   return out;
 }
 
@@ -299,8 +145,9 @@ RigRefinement refine_with_prior(const map::BundledMap& map, const camera::Rig& c
 RigRefinement refine_rig(const map::BundledMap& map, const camera::Rig& calibrated, const CalibrationOptions& options,
                          const feature::FeatureModel& features, std::stop_token stop) {
   if (!can_refine(map)) return {};
-  const auto prior = prior_with_timing(map, calibrated, options, features, stop);
-  return refine_with_prior(map, calibrated, prior, options, features, stop);
+  const EstimateInput input{map, calibrated, options, features, stop};
+  const MovedCameras cameras = moves_of_map(map);
+  return evaluate(input, estimate_rig_and_moves(input, prior_with_timing(input, cameras), cameras));
 }
 
 Eigen::MatrixXd prior_information(const camera::Rig& calibrated, const CalibrationOptions& options) {
@@ -324,12 +171,16 @@ std::optional<RigRefinement> refine_if_accepted(const map::BundledMap& map, cons
                                                 const CalibrationOptions& options,
                                                 const feature::FeatureModel& features, const std::stop_token& stop) {
   if (options.refine == Refine::kFalse || !can_refine(map)) return std::nullopt;
-  const auto prior = prior_with_timing(map, calibrated, options, features, stop);
+  const EstimateInput input{map, calibrated, options, features, stop};
+  const MovedCameras cameras = moves_of_map(map);
+  const RigAdjustmentOptions prior = prior_with_timing(input, cameras);
   if (options.refine == Refine::kAuto && !replaced(map.rig(), calibrated)) {
-    const RigRefinement first = refine_with_prior(map, calibrated, for_verdict(prior), quick(options), features, stop);
+    const CalibrationOptions fraction = quick(options);
+    const EstimateInput of_fraction{map, calibrated, fraction, features, stop};
+    const RigRefinement first = evaluate(of_fraction, estimate_rig(of_fraction, for_verdict(prior), cameras));
     if (!accepted(first, options)) return std::nullopt;
   }
-  RigRefinement out = refine_with_prior(map, calibrated, prior, options, features, stop);
+  RigRefinement out = evaluate(input, estimate_rig_and_moves(input, prior, cameras));
   return accepted(out, options) ? std::optional(std::move(out)) : std::nullopt;
 }
 

@@ -119,10 +119,6 @@ struct CalibrationOptions {
   }
 };
 
-// Standard deviation of the calibrated translations of a rig, per axis, in metres. It has a part that is proportional
-// to the longest distance of a camera from camera 0.
-double translation_deviation(const camera::Rig& rig, const CalibrationOptions& options);
-
 // A parameter of a camera model.
 struct ParameterRefinement {
   std::string name;
@@ -153,9 +149,19 @@ struct CameraRefinement {
   bool translation_observed() const { return observed[3] && observed[4] && observed[5]; }
 };
 
+// A camera that was moved relative to the others during the recording (camera::CameraMove). Its extrinsics changed by a
+// rotation angle and a displacement of its centre, with standard deviations in the direction of largest uncertainty.
+struct MoveEstimate {
+  std::size_t camera = 0;
+  TimeNs time_ns = 0;  // of the first keyframe after the move
+  double change_deg = 0, std_deg = 0, change_mm = 0, std_mm = 0;
+  double rotation_sigmas = 0, translation_sigmas = 0;  // Mahalanobis distances
+};
+
 struct RigRefinement {
   bool done = false;  // false: one camera only, no metric scale, too few observations, stopped or failed
   std::vector<CameraRefinement> cameras;     // all cameras in the order of the rig, if done
+  std::vector<MoveEstimate> moves;           // in order of time; the extrinsics in `cameras` are those before them
   std::size_t keyframes = 0, landmarks = 0;  // numbers of keyframes and landmarks used
   double excess_error = 0;                   // relative increase of the mean squared error with the given calibration
   Verdict verdict = Verdict::kUnknown;

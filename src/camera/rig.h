@@ -9,6 +9,7 @@
 
 #include "base/id.h"
 #include "base/result.h"
+#include "base/timestamp.h"
 #include "camera/camera.h"
 #include "camera/rolling_shutter.h"
 #include "geometry/se3.h"
@@ -18,6 +19,15 @@ namespace bslam::camera {
 struct RigCamera {
   Camera camera;
   geometry::SE3 T_body_cam;  // from the calibration file
+};
+
+// A camera that was moved relative to the rig during a recording, because it was hit or its mount slipped. From a time
+// on, T_cam_rig is T_after_before T_cam_rig, up to its next move. T_after_before refers to the extrinsics at the
+// beginning of the recording, also if there is an earlier move.
+struct CameraMove {
+  std::size_t camera = 0;
+  TimeNs time_ns = 0;
+  geometry::SE3 T_after_before;
 };
 
 // Immutable; copies share the calibration.
@@ -52,6 +62,16 @@ class Rig {
   geometry::SE3 rig_from_first(std::size_t i) const { return i == 0 ? geometry::SE3() : rig_from_cam(i); }
   geometry::SE3 body_from_first(std::size_t i) const { return i == 0 ? body_from_rig() : body_from_cam(i); }
 
+  // The moves of cameras during the recording, in order of time; usually there are none. All other functions give the
+  // extrinsics at its beginning.
+  std::span<const CameraMove> moves() const { return calibration_->moves; }
+  Rig with_moves(std::vector<CameraMove> moves) const;
+  // T_cam_rig of a camera at a time, and the rig with the extrinsics of a time.
+  geometry::SE3 cam_from_rig_at(std::size_t i, TimeNs time_ns) const;
+  Rig at(TimeNs time_ns) const;
+  // The rig as it is after all moves, as a rig without moves.
+  Rig after_moves() const;
+
   // A lower bound of the cosine of the angle between the optical axis and the ray of any pixel, with a margin for the
   // motion during a rolling shutter; -1 if it is not known, since not every pixel at the border has a ray.
   double min_axis_cosine(CameraIndex i) const { return calibration_->min_axis_cosine[i.index()]; }
@@ -66,17 +86,18 @@ class Rig {
 
   // The same cameras, with the frame of camera 0 as the rig frame.
   Rig in_frame_of_camera_0() const {
-    return T_cam_rig_.front().matrix().isIdentity(0) ? *this : Rig(calibration_->cameras);
+    return T_cam_rig_.front().matrix().isIdentity(0) ? *this
+                                                     : Rig(calibration_->cameras).with_moves(calibration_->moves);
   }
   // Returns the rig that consists of the given cameras, in the given order; the first becomes camera 0. The indices
   // must be valid and distinct.
   Rig subset(std::span<const int> indices) const;
-  // The inverse of `subset`: returns this rig with models, timing and extrinsics (T_body_cam) of the cameras `indices`
-  // taken from `part`, and with its rig frame if both begin with the same camera.
+  // The inverse of `subset`: returns this rig with models, timing, extrinsics (T_body_cam) and moves of the cameras
+  // `indices` taken from `part`, and with its rig frame if both begin with the same camera.
   Rig with_calibration_of(const Rig& part, std::span<const int> indices) const;
 
   // Whether all cameras of two rigs have the same model with the same parameters, and whether they also have the same
-  // extrinsics. The rigs must have the same number of cameras.
+  // extrinsics and moves. The rigs must have the same number of cameras.
   bool same_intrinsics(const Rig& other) const;
   bool same_calibration(const Rig& other) const;
 
@@ -93,7 +114,9 @@ class Rig {
     std::vector<RigCamera> cameras;
     std::vector<double> overlap;          // (N, N) row-major
     std::vector<double> min_axis_cosine;  // per camera
+    std::vector<CameraMove> moves;
   };
+  const CameraMove* move_at(std::size_t i, TimeNs time_ns) const;  // the last one of a camera until a time, or null
   std::vector<double> measured_overlap(const std::vector<RigCamera>& cameras) const;
 
   std::shared_ptr<const Calibration> calibration_;

@@ -67,7 +67,8 @@ double farthest_delay_s(const BundledFrame& frame) {
 camera::Rig rig_of(const camera::Rig& rig, const BundledFrame& frame) { return rig_of(rig, frame, frame.twist); }
 
 camera::Rig rig_of(const camera::Rig& rig, const BundledFrame& frame, const geometry::Vector6d& twist) {
-  return rig.moving(delays_of(frame), twist);
+  const std::vector<double> delays = delays_of(frame);
+  return rig.moves().empty() ? rig.moving(delays, twist) : rig.at(frame.time_ns).moving(delays, twist);
 }
 
 }  // namespace bslam::frame

@@ -56,7 +56,8 @@ std::vector<double> delays_of(const BundledFrame& frame);
 // The delay with the largest absolute value.
 double farthest_delay_s(const BundledFrame& frame);
 
-// The rig with the camera poses at their capture times, for the frame's twist or the given one.
+// The rig at the time of the frame, with the camera poses at their capture times, for the frame's twist or the given
+// one.
 camera::Rig rig_of(const camera::Rig& rig, const BundledFrame& frame);
 camera::Rig rig_of(const camera::Rig& rig, const BundledFrame& frame, const geometry::Vector6d& twist);
 

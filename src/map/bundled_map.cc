@@ -102,8 +102,12 @@ geometry::SE3 BundledMap::resolved_pose(KeyframeId k) const {
 }
 
 geometry::SE3 BundledMap::rig_from_cam(const BundledKeyframe& k, CameraIndex c) const {
-  const geometry::SE3& T_rig_cam = rig_->rig_from_cam(c.index());
+  const geometry::SE3 T_rig_cam = rig_->moves().empty() ? rig_->rig_from_cam(c.index()) : cam_from_rig(k, c).inverse();
   return k.frame->delay_s(c.index()) == 0.0 ? T_rig_cam : motion_of(k, c).inverse() * T_rig_cam;
+}
+
+geometry::SE3 BundledMap::cam_from_rig(const BundledKeyframe& k, CameraIndex c) const {
+  return rig_->moves().empty() ? rig_->cam_from_rig(c) : rig_->cam_from_rig_at(c.index(), k.frame->time_ns);
 }
 
 camera::Rig BundledMap::rig_of(KeyframeId k) const {
@@ -114,7 +118,7 @@ geometry::SE3 BundledMap::motion_until(KeyframeId k, CameraIndex c) const { retu
 
 geometry::SE3 BundledMap::cam_from_world(KeyframeId k, CameraIndex c) const {
   const BundledKeyframe& entry = keyframe(k);
-  const geometry::SE3& T_cam_rig = rig_->cam_from_rig(c);
+  const geometry::SE3 T_cam_rig = cam_from_rig(entry, c);
   if (entry.frame->delay_s(c.index()) == 0.0) return T_cam_rig * entry.T_rig_world;
   return T_cam_rig * motion_of(entry, c) * entry.T_rig_world;
 }
@@ -126,7 +130,7 @@ geometry::SE3 BundledMap::cam_from_world(KeyframeId k, frame::KeypointRef keypoi
 
 camera::Shutter BundledMap::shutter(KeyframeId k, CameraIndex c) const {
   const BundledKeyframe& entry = keyframe(k);
-  return {rig_->camera(c), rig_->cam_from_rig(c) * motion_of(entry, c), entry.twist};
+  return {rig_->camera(c), cam_from_rig(entry, c) * motion_of(entry, c), entry.twist};
 }
 
 std::vector<BundledMap::ReplacedFrame> BundledMap::set_rig(std::shared_ptr<const camera::Rig> rig,

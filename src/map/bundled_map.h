@@ -251,6 +251,7 @@ class BundledMap {
   Landmark& edit(LandmarkId l) { return landmarks_.mutate(l.index(), owner_.tag()); }
   void refresh_descriptor(LandmarkId l);  // does nothing if the observations have not changed since its last call
   geometry::SE3 rig_from_cam(const BundledKeyframe& k, CameraIndex c) const;
+  geometry::SE3 cam_from_rig(const BundledKeyframe& k, CameraIndex c) const;  // without the motion of the rig
   std::size_t num_keypoints(Observation o) const {
     return keyframe(o.keyframe).frame->bundled.keypoints(o.feature).size();
   }

@@ -66,6 +66,12 @@ std::vector<camera::RigCamera> moved_into(const camera::Rig& whole, const camera
   return out;
 }
 
+// Adds the moves of cameras of a rig, whose camera 0 is camera `first` of another one.
+void add_moves(const camera::Rig& rig, std::size_t first, std::vector<camera::CameraMove>& moves) {
+  for (const camera::CameraMove& move : rig.moves())
+    moves.push_back({first + move.camera, move.time_ns, move.T_after_before});
+}
+
 // Appends a rig with its calibration as it was given and as it is, and returns the index of its first camera.
 std::size_t append_rig(BundledMap& map, const camera::Rig& given_rig, const camera::Rig& rig) {
   const std::size_t first = map.rig().size();
@@ -75,7 +81,11 @@ std::size_t append_rig(BundledMap& map, const camera::Rig& given_rig, const came
     all.push_back(std::move(added));
   }
   std::ranges::move(moved_into(map.given_rig(), given_rig), std::back_inserter(given));
-  map.append_cameras(std::make_shared<const camera::Rig>(std::move(all), map.rig().cam_from_rig(0)),
+  std::vector<camera::CameraMove> moves;
+  add_moves(map.rig(), 0, moves);
+  add_moves(rig, first, moves);
+  const camera::Rig extended(std::move(all), map.rig().cam_from_rig(0));
+  map.append_cameras(std::make_shared<const camera::Rig>(extended.with_moves(std::move(moves))),
                      std::make_shared<const camera::Rig>(std::move(given), map.given_rig().cam_from_rig(0)));
   return first;
 }
@@ -157,25 +167,34 @@ void BundledMap::append_cameras(std::shared_ptr<const camera::Rig> rig, std::sha
 }
 
 std::optional<std::size_t> find_rig(const BundledMap& map, const camera::Rig& rig) {
+  std::optional<std::size_t> moved;
   for (std::size_t first = 0; first + rig.size() <= map.rig().size(); ++first) {
     if (!same_pose(map.given_rig().cam_from_rig(first), geometry::SE3())) continue;  // within another rig
     const camera::Rig& given = map.given_rig();
-    if (contains(given, given, first, rig) || contains(map.rig(), given, first, rig)) return first;
+    if (!contains(given, given, first, rig) && !contains(map.rig(), given, first, rig)) continue;
+    if (cameras_of(map.rig(), first, rig.size()).moves().empty()) return first;
+    if (!moved) moved = first;
   }
-  return std::nullopt;
+  return moved;
 }
 
 std::size_t find_or_append_rig(BundledMap& map, const camera::Rig& rig) {
   const auto found = find_rig(map, rig);
-  return found ? *found : append_rig(map, rig, rig);
+  if (!found) return append_rig(map, rig, rig);
+  const camera::Rig of_map = cameras_of(map.rig(), *found, rig.size());
+  if (of_map.moves().empty()) return *found;
+  return append_rig(map, cameras_of(map.given_rig(), *found, rig.size()), of_map.after_moves());
 }
 
 std::vector<CameraIndex> find_or_append_rigs(BundledMap& map, const BundledMap& other) {
   std::vector<CameraIndex> out;
   for (const std::size_t size : sizes_of_rigs(other)) {
     const camera::Rig given = cameras_of(other.given_rig(), out.size(), size);
-    const auto found = find_rig(map, given);
-    const std::size_t first = found ? *found : append_rig(map, given, cameras_of(other.rig(), out.size(), size));
+    const camera::Rig rig = cameras_of(other.rig(), out.size(), size);
+    auto found = find_rig(map, given);
+    // The moves of a recording do not apply to another one.
+    if (!rig.moves().empty() || (found && !cameras_of(map.rig(), *found, size).moves().empty())) found.reset();
+    const std::size_t first = found ? *found : append_rig(map, given, rig);
     for (std::size_t i = 0; i < size; ++i) out.emplace_back(first + i);
   }
   return out;
@@ -204,7 +223,12 @@ camera::Rig with_cameras(const camera::Rig& whole, std::size_t first, const came
   if (part.size() == whole.size()) return part;
   std::vector<camera::RigCamera> out = cameras(whole);
   std::ranges::move(moved_into(whole, part), out.begin() + static_cast<std::ptrdiff_t>(first));
-  return camera::Rig(std::move(out), first == 0 ? part.cam_from_rig(0) : whole.cam_from_rig(0));
+  std::vector<camera::CameraMove> moves;
+  for (const camera::CameraMove& move : whole.moves()) {
+    if (move.camera < first || move.camera >= first + part.size()) moves.push_back(move);
+  }
+  add_moves(part, first, moves);
+  return camera::Rig(std::move(out), first == 0 ? part.cam_from_rig(0) : whole.cam_from_rig(0)).with_moves(moves);
 }
 
 camera::Rig cameras_of(const camera::Rig& whole, std::size_t first, std::size_t size) {
@@ -213,7 +237,12 @@ camera::Rig cameras_of(const camera::Rig& whole, std::size_t first, std::size_t 
   const auto begin = out.begin() + static_cast<std::ptrdiff_t>(first);
   out.erase(begin + static_cast<std::ptrdiff_t>(size), out.end());
   out.erase(out.begin(), begin);
-  return camera::Rig(std::move(out), whole.cam_from_rig(first));
+  std::vector<camera::CameraMove> moves;
+  for (const camera::CameraMove& move : whole.moves()) {
+    if (move.camera >= first && move.camera < first + size)
+      moves.push_back({move.camera - first, move.time_ns, move.T_after_before});
+  }
+  return camera::Rig(std::move(out), whole.cam_from_rig(first)).with_moves(std::move(moves));
 }
 
 }  // namespace bslam::map

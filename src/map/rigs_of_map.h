@@ -13,10 +13,12 @@ namespace bslam::map {
 
 // Returns the index of the map's camera that is camera 0 of `rig`, if the cameras of `rig` are consecutive cameras of
 // the map and that one is the first camera of a rig. Cameras are equal if `rig` has their calibration, or that which
-// they had before a run refined it, and the name of no other camera of the map.
+// they had before a run refined it, and the name of no other camera of the map. Rigs without moves of cameras come
+// first.
 std::optional<std::size_t> find_rig(const BundledMap& map, const camera::Rig& rig);
 
-// As find_rig, but appends the cameras if the map does not have them. A camera whose name is already used is renamed to
+// As find_rig, but appends the cameras if the map does not have them, or if a camera was moved while the map was made:
+// then they are appended as they are since its last move. A camera whose name is already used is renamed to
 // camN, with its index N in the map.
 std::size_t find_or_append_rig(BundledMap& map, const camera::Rig& rig);
 

@@ -217,7 +217,7 @@ double largest_capture_shift_px(const Selection& selection) {
     const Eigen::Vector3d& p = map.landmark(l).position;
     for_each_keypoint(selection, l, [&](KeyframeId k, frame::KeypointRef r) {
       const auto& frame = *map.keyframe(k).frame;
-      if (frame.cameras[r.camera.index()].time_ns == frame.time_ns) return;
+      if (frame.cameras[r.camera.index()].time_ns == frame.time_ns && map.rig().moves().empty()) return;
       const Camera& camera = map.rig().camera(r.camera);
       const auto moved = camera.project(map.cam_from_world(k, r.camera) * p);
       const auto rigid = camera.project(map.rig().cam_from_rig(r.camera) * map.keyframe(k).T_rig_world * p);

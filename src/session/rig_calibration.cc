@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "base/assert.h"
+#include "calibration/calibration_prior.h"
 #include "camera/model_table.h"
 #include "session/run_session.h"
 

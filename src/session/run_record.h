@@ -72,12 +72,20 @@ struct CameraRecord {
   calibration::ImageResiduals residuals = {};
 };
 
+// A camera that was moved relative to the others during the run.
+struct CameraMoveRecord {
+  std::size_t camera = 0;
+  double at_s = 0.0;  // of the first keyframe after it
+  double change_deg = 0.0, std_deg = 0.0, change_mm = 0.0, std_mm = 0.0;
+};
+
 // The estimate of the calibration at the end of the run.
 struct CalibrationRecord {
   calibration::RigRefinement estimate;
   // Whether the estimate can be used. If images of cameras disagree as a whole, it may have made a wrong calibration
   // fit wrong matches, or images that were taken at different times.
   bool applies = false;
+  std::vector<CameraMoveRecord> moves = {};
   bool refined = false;     // the final map uses an estimated rig that applies, which is written to rig_refined.yaml
   double excess_bound = 0;  // the images contradict the calibration if estimate.excess_error is larger
   std::vector<calibration::CameraPair> pairs =

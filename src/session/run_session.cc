@@ -153,9 +153,10 @@ Result<Fed> feed(const dataset::Dataset& dataset, const SessionOptions& options,
 
 namespace {
 
-// Returns the calibration of all cameras, with that of `found` for the cameras in use.
+// Returns the calibration of all cameras, with that of `found`, as it is at the end, for the cameras in use.
 camera::Rig with_refined_calibration(const camera::Rig& found, const dataset::Dataset& dataset) {
-  return dataset.whole_rig ? dataset.whole_rig->with_calibration_of(found, dataset.cameras_used) : found;
+  const camera::Rig last = found.after_moves();
+  return dataset.whole_rig ? dataset.whole_rig->with_calibration_of(last, dataset.cameras_used) : last;
 }
 
 // The map at the end of the run, without metric scale if the scale is meaningless.

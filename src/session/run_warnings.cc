@@ -124,6 +124,19 @@ void warn_of_timing(const std::string& name, const calibration::CameraRefinement
   }
 }
 
+// Warns of cameras that were moved during the run. Of two cameras, it is not known which one was moved.
+void warn_of_moves(const RunRecord& record, Warnings& warnings) {
+  for (const CameraMoveRecord& move : record.calibration.moves) {
+    if (move.camera >= record.cameras.size()) continue;
+    warn(warnings,
+         "{}: moved relative to {} at about {:.1f} s, by {:.2f} deg (std {:.2f}) and {:.1f} mm (std {:.1f}); {}",
+         record.cameras[move.camera].name, record.cameras.size() == 2 ? record.cameras[0].name : "the other cameras",
+         move.at_s, move.change_deg, move.std_deg, move.change_mm, move.std_mm,
+         record.calibration.refined ? "the map takes this into account, and rig_refined.yaml is the rig after it"
+                                    : "the map does not take this into account");
+  }
+}
+
 std::string contradiction_text(const RunRecord& record) {
   return fmt::format(
       "the images contradict the calibration, which multiplies their squared reprojection error by {:.1f}",
@@ -151,6 +164,7 @@ void warn_of_estimate(const RunRecord& record, const camera::Rig& rig, Warnings&
   const CalibrationRecord& calibration = record.calibration;
   if (calibration.foreign_images()) return;
   const bool contradicted = calibration.estimate.verdict == calibration::Verdict::kInconsistent;
+  warn_of_moves(record, warnings);
   for (const CameraRecord& camera : record.cameras) warn_of_extrinsics(camera, calibration.applies, warnings);
   for (std::size_t c = 0; c < std::min(calibration.estimate.cameras.size(), record.cameras.size()); ++c) {
     if (contradicted) {

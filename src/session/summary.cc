@@ -134,6 +134,16 @@ ordered_json calibration_json(const RunRecord& record) {
          {"contradicted", pair.contradicted},
          {"evidence", pair.evidence ? ordered_json(calibration::describe_pair(*pair.evidence)) : ordered_json()}});
   }
+  ordered_json moves = ordered_json::array();
+  for (const CameraMoveRecord& move : record.calibration.moves) {
+    if (move.camera >= record.cameras.size()) continue;
+    moves.push_back({{"camera", record.cameras[move.camera].name},
+                     {"at", seconds(move.at_s)},
+                     {"rotation_deg", rounded(move.change_deg, 4)},
+                     {"rotation_std_deg", rounded(move.std_deg, 4)},
+                     {"translation_mm", rounded(move.change_mm, 3)},
+                     {"translation_std_mm", rounded(move.std_mm, 3)}});
+  }
   for (const std::size_t c : record.calibration.disagreeing) disagreeing.push_back(record.cameras[c].name);
   return {{"verdict", calibration::verdict_name(record.calibration.verdict())},
           {"excess_error", estimate.done ? rounded(estimate.excess_error, 4) : ordered_json()},
@@ -141,6 +151,7 @@ ordered_json calibration_json(const RunRecord& record) {
           {"pairs", pairs},
           {"disagreeing", disagreeing},
           {"late_camera", late_json(record)},
+          {"moves", moves},
           {"refined", record.calibration.refined},
           {"cameras", cameras}};
 }

@@ -27,7 +27,8 @@ struct ReprojectionProblem {
   const Rig* rig = nullptr;
   std::vector<SE3> T_rig_world;
   // (poses, cameras) row-major: the motion of the rig from the time of a pose to the capture time of a camera's image,
-  // T_cam_world = T_cam_rig motion T_rig_world. Constant; empty if all cameras have the same capture time.
+  // T_cam_world = T_cam_rig motion T_rig_world. Constant; empty if all cameras have the same capture time and none was
+  // moved relative to the rig.
   std::vector<SE3> motion;
   // Per pose: the velocity of the rig while its images were captured, rad/s and m/s, as in Rig::moving. Constant; empty
   // if it is not needed: all shutters are global, and their timing is constant.

@@ -22,6 +22,17 @@ Matrix6d change_jacobian(const Vector6d& change) {
   return J;
 }
 
+// Adds the columns of the next camera, which has `size` unknowns, to those of the cameras before it.
+void add_columns(const SharedUnknowns& shared, int size, std::vector<RigBlock::Range>& columns, int& total) {
+  const std::size_t c = columns.size();
+  if (!has_own_unknowns(shared, c)) {
+    columns.push_back(columns[shared[c]]);
+  } else {
+    columns.push_back({total, size});
+    total += size;
+  }
+}
+
 }  // namespace
 
 RigValues RigValues::of(const Rig& rig) {
@@ -154,13 +165,9 @@ void ExtrinsicsBlock::add_prior(const RigValues& values, Eigen::Ref<Eigen::Matri
   b -= scale_error(values) * scale_jacobian;
 }
 
-IntrinsicsBlock::IntrinsicsBlock(IntrinsicPrior prior) : prior_(std::move(prior)), first_{0} {
-  for (const camera::ModelParameters& p : prior_.values) first_.push_back(first_.back() + static_cast<int>(p.size()));
-}
-
-RigBlock::Range IntrinsicsBlock::columns(int camera) const {
-  const auto c = static_cast<std::size_t>(camera);
-  return {first_[c], first_[c + 1] - first_[c]};
+IntrinsicsBlock::IntrinsicsBlock(IntrinsicPrior prior) : prior_(std::move(prior)) {
+  for (std::size_t c = 0; c < prior_.values.size(); ++c)
+    add_columns(prior_.shared, static_cast<int>(prior_.values[c].size()), columns_, size_);
 }
 
 void IntrinsicsBlock::evaluate(const RigObservation& observation, Eigen::Ref<Jacobian> J) const {
@@ -172,7 +179,7 @@ void IntrinsicsBlock::evaluate(const RigObservation& observation, Eigen::Ref<Jac
 void IntrinsicsBlock::apply(const Eigen::VectorXd& delta, RigValues& values) const {
   for (std::size_t c = 0; c < values.models.size(); ++c) {
     const camera::ModelParameters step =
-        delta.segment(first_[c], first_[c + 1] - first_[c]).cwiseProduct(prior_.sigmas[c]);
+        delta.segment(columns_[c].first, columns_[c].size).cwiseProduct(prior_.sigmas[c]);
     values.models[c] = camera::with_parameters(values.models[c], camera::parameters(values.models[c]) + step);
   }
 }
@@ -180,7 +187,8 @@ void IntrinsicsBlock::apply(const Eigen::VectorXd& delta, RigValues& values) con
 Eigen::VectorXd IntrinsicsBlock::normalised_change(const RigValues& values) const {
   Eigen::VectorXd out(size());
   for (std::size_t c = 0; c < values.models.size(); ++c) {
-    out.segment(first_[c], first_[c + 1] - first_[c]) =
+    if (!has_own_unknowns(prior_.shared, c)) continue;
+    out.segment(columns_[c].first, columns_[c].size) =
         (camera::parameters(values.models[c]) - prior_.values[c]).cwiseQuotient(prior_.sigmas[c]);
   }
   return out;
@@ -196,7 +204,8 @@ double IntrinsicsBlock::prior_cost(const RigValues& values) const {
   const Eigen::VectorXd change = normalised_change(values);
   double sum = change.squaredNorm();
   for (std::size_t c = 0; c < values.models.size(); ++c) {
-    const double aspect = aspect_gradient(c).dot(change.segment<2>(first_[c]));
+    if (!has_own_unknowns(prior_.shared, c)) continue;
+    const double aspect = aspect_gradient(c).dot(change.segment<2>(columns_[c].first));
     sum += aspect * aspect;
   }
   return 0.5 * sum;
@@ -208,19 +217,18 @@ void IntrinsicsBlock::add_prior(const RigValues& values, Eigen::Ref<Eigen::Matri
   H.diagonal().array() += 1.0;
   b -= change;
   for (std::size_t c = 0; c < values.models.size(); ++c) {
+    if (!has_own_unknowns(prior_.shared, c)) continue;
+    const int first = columns_[c].first;
     const Vector2d gradient = aspect_gradient(c);
-    H.block<2, 2>(first_[c], first_[c]) += gradient * gradient.transpose();
-    b.segment<2>(first_[c]) -= gradient.dot(change.segment<2>(first_[c])) * gradient;
+    H.block<2, 2>(first, first) += gradient * gradient.transpose();
+    b.segment<2>(first) -= gradient.dot(change.segment<2>(first)) * gradient;
   }
 }
 
-TimingBlock::TimingBlock(std::vector<TimingPrior> prior) : prior_(std::move(prior)), first_{0} {
-  for (const TimingPrior& p : prior_) first_.push_back(first_.back() + (p.sigma_shift > 0) + (p.sigma_readout > 0));
-}
-
-RigBlock::Range TimingBlock::columns(int camera) const {
-  const auto c = static_cast<std::size_t>(camera);
-  return {first_[c], first_[c + 1] - first_[c]};
+TimingBlock::TimingBlock(std::vector<TimingPrior> prior, SharedUnknowns shared)
+    : prior_(std::move(prior)), shared_(std::move(shared)) {
+  for (const TimingPrior& p : prior_)
+    add_columns(shared_, (p.sigma_shift > 0) + (p.sigma_readout > 0), columns_, size_);
 }
 
 void TimingBlock::evaluate(const RigObservation& observation, Eigen::Ref<Jacobian> J) const {
@@ -233,7 +241,7 @@ void TimingBlock::evaluate(const RigObservation& observation, Eigen::Ref<Jacobia
 
 void TimingBlock::apply(const Eigen::VectorXd& delta, RigValues& values) const {
   for (std::size_t c = 0; c < prior_.size(); ++c) {
-    Eigen::Index at = first_[c];
+    Eigen::Index at = columns_[c].first;
     if (prior_[c].sigma_shift > 0) values.timing[c].shift_s += prior_[c].sigma_shift * delta(at++);
     if (prior_[c].sigma_readout > 0) values.timing[c].readout_s += prior_[c].sigma_readout * delta(at);
   }
@@ -243,7 +251,7 @@ Eigen::VectorXd TimingBlock::normalised_change(const RigValues& values) const {
   Eigen::VectorXd out(size());
   for (std::size_t c = 0; c < prior_.size(); ++c) {
     const TimingPrior& p = prior_[c];
-    Eigen::Index at = first_[c];
+    Eigen::Index at = columns_[c].first;
     if (p.sigma_shift > 0) out(at++) = (values.timing[c].shift_s - p.mean.shift_s) / p.sigma_shift;
     if (p.sigma_readout > 0) out(at) = (values.timing[c].readout_s - p.mean.readout_s) / p.sigma_readout;
   }

@@ -111,11 +111,19 @@ class ExtrinsicsBlock : public RigBlock {
   double scale_gradient_ = 0;                    // 1 / (sigma_scale sum |c'|^2); 0 without a prior of the scale
 };
 
+// Per camera: the camera, before it or itself, whose unknowns it has, because it is the same camera at another place.
+// Empty: every camera has its own.
+using SharedUnknowns = std::vector<std::size_t>;
+inline bool has_own_unknowns(const SharedUnknowns& shared, std::size_t camera) {
+  return shared.empty() || shared[camera] == camera;
+}
+
 // Prior for the intrinsics: normal distributions around the calibrated values, and one of the ratio fx / fy, which is
 // known better than either.
 struct IntrinsicPrior {
   std::vector<camera::ModelParameters> values, sigmas;  // per camera; the sigmas must be positive
   double sigma_aspect = 0;                              // relative standard deviation of fx / fy; 0: no separate prior
+  SharedUnknowns shared = {};
 };
 
 // The parameters of the camera models of all cameras (camera/model_parameters.h), relative to their standard deviations
@@ -124,13 +132,13 @@ class IntrinsicsBlock : public RigBlock {
  public:
   explicit IntrinsicsBlock(IntrinsicPrior prior);
 
-  int size() const override { return first_.back(); }
-  Range columns(int camera) const override;
+  int size() const override { return size_; }
+  Range columns(int camera) const override { return columns_[static_cast<std::size_t>(camera)]; }
   void evaluate(const RigObservation& observation, Eigen::Ref<Jacobian> J) const override;
   void apply(const Eigen::VectorXd& delta, RigValues& values) const override;
   double prior_cost(const RigValues& values) const override;
   void add_prior(const RigValues& values, Eigen::Ref<Eigen::MatrixXd> H, Eigen::Ref<Eigen::VectorXd> b) const override;
-  // Differences to the prior's values in standard deviations, all cameras one after the other.
+  // Differences to the prior's values in standard deviations, of all cameras with own unknowns one after the other.
   Eigen::VectorXd normalised_change(const RigValues& values) const;
 
  private:
@@ -139,7 +147,8 @@ class IntrinsicsBlock : public RigBlock {
   Vector2d aspect_gradient(std::size_t camera) const;
 
   IntrinsicPrior prior_;
-  std::vector<int> first_;  // per camera, and the end
+  std::vector<Range> columns_;  // per camera
+  int size_ = 0;
 };
 
 // Prior for the timing of a camera: normal distributions around the calibrated values, in seconds. A value with the
@@ -153,20 +162,23 @@ struct TimingPrior {
 // shift of camera 0 should be constant, because a common shift of all cameras changes nothing but the poses.
 class TimingBlock : public RigBlock {
  public:
-  explicit TimingBlock(std::vector<TimingPrior> prior);
+  explicit TimingBlock(std::vector<TimingPrior> prior, SharedUnknowns shared = {});
 
-  int size() const override { return first_.back(); }
-  Range columns(int camera) const override;
+  int size() const override { return size_; }
+  Range columns(int camera) const override { return columns_[static_cast<std::size_t>(camera)]; }
   void evaluate(const RigObservation& observation, Eigen::Ref<Jacobian> J) const override;
   void apply(const Eigen::VectorXd& delta, RigValues& values) const override;
   double prior_cost(const RigValues& values) const override;
   void add_prior(const RigValues& values, Eigen::Ref<Eigen::MatrixXd> H, Eigen::Ref<Eigen::VectorXd> b) const override;
-  // Differences to the prior's values in standard deviations, all cameras one after the other, shift before readout.
+  // Differences to the prior's values in standard deviations, of all cameras with own unknowns one after the other,
+  // shift before readout.
   Eigen::VectorXd normalised_change(const RigValues& values) const;
 
  private:
   std::vector<TimingPrior> prior_;
-  std::vector<int> first_;  // per camera, and the end
+  SharedUnknowns shared_;
+  std::vector<Range> columns_;  // per camera
+  int size_ = 0;
 };
 
 // A common scale factor of the translations of all extrinsics, as its relative change.

@@ -21,7 +21,7 @@ namespace bslam::storage {
 namespace {
 
 constexpr std::string_view kMagic = "BSLAMMAP";
-constexpr std::uint32_t kOrderMark = 0x01020304, kVersion = 5, kOldestVersion = 2;
+constexpr std::uint32_t kOrderMark = 0x01020304, kVersion = 6, kOldestVersion = 2;
 constexpr std::array<std::string_view, 4> kTags = {"RIG ", "INFO", "KEYF", "LAND"};
 constexpr std::array<const char*, 4> kNames = {"rig", "info", "keyframes", "landmarks"};
 constexpr std::size_t kTableEntryBytes = 4 + 4 + 8;

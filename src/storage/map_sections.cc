@@ -134,6 +134,27 @@ void put_cameras(const camera::Rig& rig, ByteWriter& out) {
   const auto readouts = readouts_of(rig);
   out.numbers(readouts.data(), readouts.size());
   put_transform(rig.cam_from_rig(0), out);
+  out.count(rig.moves().size());
+  for (const camera::CameraMove& move : rig.moves()) {
+    out.number(static_cast<std::uint32_t>(move.camera));
+    out.number(move.time_ns);
+    put_transform(move.T_after_before, out);
+  }
+}
+
+std::vector<camera::CameraMove> take_moves(SectionReader& in, std::size_t cameras) {
+  constexpr std::size_t kMoveBytes = 4 + 8 + 7 * 8;
+  std::vector<camera::CameraMove> moves(in.count(kMoveBytes));
+  for (camera::CameraMove& move : moves) {
+    move.camera = in.number<std::uint32_t>();
+    move.time_ns = in.number<TimeNs>();
+    move.T_after_before = take_transform(in);
+    in.require(move.camera < cameras, "a move of camera " + std::to_string(move.camera), "a camera of the rig");
+    if (!in.ok()) return {};
+  }
+  in.require(std::ranges::is_sorted(moves, {}, &camera::CameraMove::time_ns), "moves of cameras out of order",
+             "moves in order of time");
+  return moves;
 }
 
 // `version`: of the file, see docs/map_file.md.
@@ -147,8 +168,10 @@ std::shared_ptr<const camera::Rig> take_cameras(SectionReader& in, std::size_t n
   if (in.ok() && (version >= 3 || in.remaining() > 0)) take_readouts(in, cameras);
   const SE3 T_cam0_rig = version >= 4 ? take_transform(in) : SE3();
   in.require(T_cam0_rig.translation().isZero(0), "a rig frame with another origin than camera 0", "a rotation");
+  std::vector<camera::CameraMove> moves;
+  if (version >= 6) moves = take_moves(in, cameras.size());
   if (!in.ok()) return {};
-  return std::make_shared<const camera::Rig>(std::move(cameras), T_cam0_rig);
+  return std::make_shared<const camera::Rig>(camera::Rig(std::move(cameras), T_cam0_rig).with_moves(std::move(moves)));
 }
 
 }  // namespace

@@ -18,7 +18,7 @@ void keep(std::vector<T>& values, CamerasOfRun cameras) {
 }  // namespace
 
 bool shared_with_other_rigs(const map::BundledMap& map, const camera::Rig& rig) {
-  return map.rig().size() != rig.size() || !map::find_rig(map, rig);
+  return map.rig().size() != rig.size() || !map.rig().moves().empty() || !map::find_rig(map, rig);
 }
 
 Status check_settings(const Config& config, const map::BundledMap& map, const camera::Rig& rig) {

@@ -6,6 +6,7 @@
 
 #include "adjustment/map_adjustment.h"
 #include "base/random.h"
+#include "calibration/calibration_prior.h"
 #include "calibration/path_scale.h"
 #include "camera/model_parameters.h"
 #include "geometry/triangulation.h"

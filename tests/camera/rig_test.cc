@@ -135,6 +135,59 @@ TEST(Rig, ReplacesTheTimingOfSomeCameras) {
   EXPECT_EQ(found.camera(std::size_t{0}).time_offset_ns, rig.camera(std::size_t{0}).time_offset_ns);
 }
 
+// Camera 1 was moved twice and camera 0 once.
+Rig moved_rig() {
+  const auto turn = [](double angle, double shift) {
+    return SE3(Eigen::Quaterniond(Eigen::AngleAxisd(angle, Vector3d::UnitY())), Vector3d(shift, 0, 0));
+  };
+  return three_cameras().with_moves(
+      {{1, 300, turn(0.02, 0.003)}, {1, 100, turn(0.01, 0)}, {0, 200, turn(0.03, 0.001)}});
+}
+
+TEST(Rig, HasTheExtrinsicsOfEveryTime) {
+  const Rig rig = moved_rig();
+  ASSERT_EQ(rig.moves().size(), 3u);
+  EXPECT_EQ(rig.moves()[0].time_ns, 100);  // in order of time
+  for (const TimeNs t : {99, 100, 199, 200, 299, 300}) {
+    const Rig then = rig.at(t);
+    SE3 before_1, before_0;
+    for (const CameraMove& move : rig.moves()) {
+      if (move.time_ns <= t) (move.camera == 1 ? before_1 : before_0) = move.T_after_before;
+    }
+    EXPECT_LT(difference(then.cam_from_rig(1), before_1 * rig.cam_from_rig(1)), 1e-15) << t;
+    EXPECT_LT(difference(then.cam_from_rig(0), before_0), 1e-15) << t;
+    EXPECT_LT(difference(then.rig_from_cam(1), then.cam_from_rig(1).inverse()), 1e-15) << t;
+    EXPECT_LT(difference(then.cam_from_rig(2), rig.cam_from_rig(2)), 1e-15) << t;
+    EXPECT_LT(difference(rig.cam_from_rig_at(1, t), then.cam_from_rig(1)), 1e-15) << t;
+  }
+}
+
+TEST(Rig, AfterItsMovesHasTheSameCamerasInTheBody) {
+  const Rig rig = moved_rig(), after = rig.after_moves(), last = rig.at(300);
+  EXPECT_TRUE(after.moves().empty());
+  for (std::size_t i = 0; i < rig.size(); ++i)
+    EXPECT_LT(difference(after.body_from_cam(i), rig.body_from_rig() * last.rig_from_cam(i)), 1e-14) << i;
+  for (std::size_t i = 1; i < rig.size(); ++i)
+    EXPECT_LT(difference(after.cam_from_rig(i) * after.rig_from_cam(0), last.cam_from_rig(i) * last.rig_from_cam(0)),
+              1e-14);
+  EXPECT_LT(after.cam_from_rig(0).translation().norm(), 1e-15);  // only turned, as in rig files
+}
+
+TEST(Rig, MovesBelongToTheirCameras) {
+  const Rig rig = moved_rig();
+  const Rig part = rig.subset(std::array{2, 1});
+  ASSERT_EQ(part.moves().size(), 2u);
+  EXPECT_EQ(part.moves()[1].camera, 1u);
+  const Rig other = rig.subset(std::array{1, 2});
+  ASSERT_EQ(other.moves().size(), 2u);
+  EXPECT_EQ(other.moves()[0].camera, 0u);
+  EXPECT_TRUE(rig.subset(std::array{2}).moves().empty());
+  EXPECT_EQ(three_cameras().with_calibration_of(other, std::array{1, 2}).moves()[1].camera, 1u);
+  EXPECT_EQ(rig.in_frame_of_camera_0().moves().size(), 3u);
+  EXPECT_FALSE(rig.same_calibration(three_cameras()));
+  EXPECT_TRUE(rig.same_calibration(moved_rig()));
+}
+
 TEST(Rig, OneCameraOverlapsNothing) {
   const Rig rig({{pinhole("only"), SE3()}});
   EXPECT_EQ(rig.size(), 1u);

@@ -23,12 +23,18 @@ ExtrinsicPrior prior_of(const Rig& rig) {
   return prior;
 }
 
-enum class BlockType { kExtrinsics, kBaselineScale, kTiming };
+enum class BlockType { kExtrinsics, kBaselineScale, kTiming, kSharedTiming };
 
 RigBlocks make_blocks(BlockType type, const Rig& rig) {
   RigBlocks blocks;
   if (type == BlockType::kExtrinsics) {
     blocks.push_back(std::make_unique<ExtrinsicsBlock>(prior_of(rig)));
+  } else if (type == BlockType::kSharedTiming) {
+    SharedUnknowns shared(rig.size());
+    for (std::size_t c = 0; c < rig.size(); ++c) shared[c] = c;
+    shared.back() = 1;  // the last camera has the timing of camera 1
+    blocks.push_back(
+        std::make_unique<TimingBlock>(std::vector<TimingPrior>(rig.size(), {{0, 0.02}, 0.004, 0.003}), shared));
   } else if (type == BlockType::kTiming) {
     std::vector<TimingPrior> prior(rig.size(), {{0.001, 0.02}, 0.004, 0.003});
     prior[0].sigma_shift = prior[1].sigma_readout = 0;  // constant
@@ -66,6 +72,7 @@ TEST_P(BundleGradient, AgreesWithFiniteDifferences) {
     for (std::size_t k = 0; k < scene->problem.T_rig_world.size(); ++k)
       scene->problem.twist.push_back(scene::random_twist(random, 0.9, 1.2));
     for (std::size_t c = 0; c < scene->rig.size(); ++c) start.rig.timing[c] = {0.001 * static_cast<double>(c), 0.018};
+    if (std::get<BlockType>(GetParam()) == BlockType::kSharedTiming) start.rig.timing.back() = start.rig.timing[1];
   }
   for (std::size_t c = 1; c < scene->rig.size(); ++c) {
     start.rig.T_cam_rig[c] = start.rig.T_cam_rig[c].perturbed(scene::random_twist(random, 0.02, 0.02));
@@ -107,7 +114,8 @@ TEST_P(BundleGradient, AgreesWithFiniteDifferences) {
       equations.rig_terms().apply(step * Eigen::VectorXd::Unit(rig.size(), k), s.rig);
     });
     // The velocity of a point is exact to second order of the motion between rows.
-    const double relative = std::get<BlockType>(GetParam()) == BlockType::kTiming ? 1e-4 : 1e-5;
+    const BlockType type = std::get<BlockType>(GetParam());
+    const double relative = type == BlockType::kTiming || type == BlockType::kSharedTiming ? 1e-4 : 1e-5;
     EXPECT_NEAR(rig(k), -gradient, relative * rig.norm() + 1e-3) << "rig " << k;
   }
 }
@@ -116,7 +124,41 @@ INSTANTIATE_TEST_SUITE_P(EveryModelAndBlock, BundleGradient,
                          testing::Combine(testing::Values(Models::kPinhole, Models::kRadTan, Models::kFisheye,
                                                           Models::kMixed, Models::kSpheres),
                                           testing::Values(BlockType::kExtrinsics, BlockType::kBaselineScale,
-                                                          BlockType::kTiming)));
+                                                          BlockType::kTiming, BlockType::kSharedTiming)));
+
+// Two cameras of the rig are the same one before and after a move.
+TEST(BundleEquations, HaveTheGradientOfSharedIntrinsics) {
+  Random random(8, "shared");
+  const auto scene = moving_scene(Models::kRadTan, 1.0, random);
+  const BundleStructure structure = make_structure(scene->problem, squared_errors(scene->problem), {});
+  const std::size_t last = scene->rig.size() - 1;
+  ASSERT_GE(last, 2u);
+  BundleState start = state_of(scene->problem);
+  start.rig.models[last] = start.rig.models[1];
+  IntrinsicPrior prior{.values = {}, .sigmas = {}, .sigma_aspect = 0.001, .shared = {}};
+  for (std::size_t c = 0; c <= last; ++c) {
+    prior.values.push_back(camera::parameters(start.rig.models[c]));
+    prior.sigmas.push_back(camera::typical_sigmas(start.rig.models[c], 0.01, 3));
+    prior.shared.push_back(c == last ? 1 : c);
+    prior.values.back()(0) += 2;
+  }
+  RigBlocks blocks;
+  blocks.push_back(std::make_unique<IntrinsicsBlock>(prior));
+  EXPECT_EQ(blocks[0]->size(), static_cast<int>(last) * static_cast<int>(prior.values[0].size()));
+  BundleEquations equations(scene->problem, structure, blocks, Kernel::kNone, 150, start);
+  const auto cost_at = [&](const Eigen::VectorXd& step) {
+    equations.state() = start;
+    equations.rig_terms().apply(step, equations.state().rig);
+    return equations.linearise();
+  };
+  cost_at(Eigen::VectorXd::Zero(blocks[0]->size()));
+  const Eigen::VectorXd b = equations.rig_terms().b();
+  constexpr double kStep = 1e-5;
+  for (int k = 0; k < b.size(); ++k) {
+    const Eigen::VectorXd step = kStep * Eigen::VectorXd::Unit(b.size(), k);
+    EXPECT_NEAR(b(k), -(cost_at(step) - cost_at(-step)) / (2 * kStep), 1e-5 * b.norm() + 1e-3) << k;
+  }
+}
 
 // Without noise the residuals at the minimum are zero and Gauss-Newton converges quadratically, which it does
 // only if all blocks, borders and couplings are correct.

@@ -79,11 +79,22 @@ inline void put_landmarks_4(const map::BundledMap& map, const FileIds& ids, Byte
   }
 }
 
+// The section of rigs of version 5, without moves of cameras. The given calibration must be that of the map.
+inline std::string rigs_of_version_5(const map::BundledMap& map) {
+  constexpr std::size_t kCount = sizeof(std::uint32_t);  // of cameras, and of moves
+  ByteWriter out;
+  put_rigs(map, out);
+  const std::string bytes = std::move(out).take();
+  const std::size_t one = (bytes.size() - kCount) / 2;
+  return bytes.substr(0, kCount + one - kCount) + bytes.substr(kCount + one, one - kCount);
+}
+
 // `info` must have no warning: the text is absent then.
 inline std::string version_4_bytes(const map::BundledMap& map, const MapFileInfo& info) {
   const FileIds ids(map);
   std::array<ByteWriter, 4> writers;
-  put_rigs(map, writers[0]);
+  const std::string rigs = rigs_of_version_5(map);
+  writers[0].numbers(rigs.data(), rigs.size());
   put_info(map, info, writers[1]);
   put_keyframes_4(map, ids, info.vocabulary != 0, writers[2]);
   put_landmarks_4(map, ids, writers[3]);

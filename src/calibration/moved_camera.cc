@@ -1,0 +1,257 @@
+#include "calibration/moved_camera.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+#include <utility>
+
+#include "camera/rolling_shutter.h"
+
+namespace bslam::calibration {
+namespace {
+
+using geometry::Matrix6d;
+using geometry::SE3;
+using geometry::Vector6d;
+
+constexpr int kMinObservations = 20, kMinKeyframes = 3;  // before and after a move: keyframes with so many observations
+constexpr double kMaxChi2 = 16 * solver::kChi2TwoDof95;  // of observations that are used
+
+// Normal equations of the extrinsics of a camera.
+struct Equations {
+  Matrix6d H = Matrix6d::Zero();
+  Vector6d b = Vector6d::Zero();
+  int observations = 0, keyframes = 0;
+
+  void add_keyframe(const Equations& other) {
+    H += other.H;
+    b += other.b;
+    keyframes += other.observations >= kMinObservations;
+  }
+};
+
+using Observation = solver::ReprojectionProblem::Observation;
+
+// The point of an observation in the frame of camera c of the problem when the row of the pixel was exposed.
+Eigen::Vector3d point_in_camera(const solver::ReprojectionProblem& problem, const solver::RigValues& values,
+                                const Observation& o, std::size_t c) {
+  const auto pose = static_cast<std::size_t>(o.pose);
+  SE3 T_cam_rig = values.T_cam_rig[c];
+  if (!problem.motion.empty()) T_cam_rig = T_cam_rig * problem.motion[pose * values.T_cam_rig.size() + c];
+  const Eigen::Vector3d point =
+      T_cam_rig * (problem.T_rig_world[pose] * problem.points[static_cast<std::size_t>(o.point)]);
+  if (problem.twist.empty()) return point;
+  return camera::Shutter(problem.rig->camera(c), values.timing[c], T_cam_rig, problem.twist[pose])
+      .at_row(point, static_cast<double>(o.pixel.y()));
+}
+
+// The cost of an observation with the extrinsics of camera c of the problem.
+double cost(const solver::ReprojectionProblem& problem, const solver::RigValues& values, const Observation& o,
+            std::size_t c) {
+  const Eigen::Vector3d point = point_in_camera(problem, values, o, c);
+  const auto error = solver::residual_error(values.models[c], point, o.pixel.cast<double>());
+  const double sigma = static_cast<double>(o.sigma);
+  const double chi2 = error ? error->squaredNorm() / (sigma * sigma) : kMaxChi2;
+  return solver::huber_cost(std::min(chi2, kMaxChi2));
+}
+
+// Adds an observation to the equations of its camera in its keyframe.
+void add(const solver::ReprojectionProblem& problem, const solver::RigValues& values, const Observation& o,
+         Equations& sums) {
+  const std::size_t c = o.camera.index();
+  const Eigen::Vector3d point = point_in_camera(problem, values, o, c);
+  const auto residual = solver::residual(values.models[c], point, o.pixel.cast<double>());
+  if (!residual) return;
+  const double inverse_sigma = 1.0 / static_cast<double>(o.sigma);
+  const Eigen::Vector2d e = inverse_sigma * residual->error;
+  const double chi2 = e.squaredNorm();
+  if (!(chi2 < kMaxChi2)) return;
+  const solver::Matrix62d Jt = solver::pose_jacobian_transposed(inverse_sigma * residual->J, point);
+  const double weight = solver::huber_weight(chi2);
+  sums.H += weight * Jt * Jt.transpose();
+  sums.b += weight * Jt * e;
+  ++sums.observations;
+}
+
+// The change of the extrinsics of the part `after` relative to the rest that decreases the cost most, and twice that
+// decrease.
+std::pair<Vector6d, double> best_change(const Equations& all, const Equations& after) {
+  const Eigen::LDLT<Matrix6d> factor(all.H);
+  const Matrix6d information = after.H - after.H * factor.solve(after.H);
+  const Vector6d b = after.b - after.H * factor.solve(all.b);
+  const Vector6d change = information.ldlt().solve(b);
+  return {change, b.dot(change)};
+}
+
+void sort_observations(RigProblem& problem) {
+  // All observations of a point by one pose have the same source, so that sources stay in order.
+  std::ranges::stable_sort(problem.flat.problem.observations, {},
+                           [](const auto& o) { return std::tuple(o.point, o.pose, o.camera); });
+}
+
+}  // namespace
+
+MovedCameras::MovedCameras(std::size_t cameras, std::vector<camera::CameraMove> moves)
+    : cameras_(cameras), moves_(std::move(moves)) {}
+
+std::size_t MovedCameras::before(std::size_t m) const {
+  for (std::size_t i = m; i-- > 0;) {
+    if (moves_[i].camera == moves_[m].camera) return cameras_ + i;
+  }
+  return moves_[m].camera;
+}
+
+std::size_t MovedCameras::camera_at(std::size_t camera, TimeNs time_ns) const {
+  std::size_t out = camera;
+  for (std::size_t m = 0; m < moves_.size(); ++m) {
+    if (moves_[m].camera == camera && moves_[m].time_ns <= time_ns) out = cameras_ + m;
+  }
+  return out;
+}
+
+camera::Rig MovedCameras::added_to(const camera::Rig& rig) const {
+  if (moves_.empty()) return rig;
+  std::vector<camera::RigCamera> cameras;
+  for (std::size_t c = 0; c < rig.size(); ++c) cameras.push_back({rig.camera(c), rig.body_from_cam(c)});
+  for (const camera::CameraMove& move : moves_) cameras.push_back(cameras[move.camera]);
+  return camera::Rig(std::move(cameras));
+}
+
+solver::RigValues MovedCameras::added_to(solver::RigValues values) const {
+  for (const camera::CameraMove& move : moves_) {
+    values.T_cam_rig.push_back(move.T_after_before * values.T_cam_rig[move.camera]);
+    values.models.push_back(values.models[move.camera]);
+    values.timing.push_back(values.timing[move.camera]);
+  }
+  return values;
+}
+
+RigAdjustmentOptions MovedCameras::added_to(RigAdjustmentOptions options) const {
+  if (moves_.empty()) return options;
+  for (std::size_t c = 0; c < cameras_; ++c) options.shared.push_back(c);
+  for (const camera::CameraMove& move : moves_) {
+    options.shared.push_back(move.camera);
+    options.sigma_intrinsics.push_back(options.sigma_intrinsics[move.camera]);
+    if (!options.timing.empty()) options.timing.push_back(options.timing[move.camera]);
+  }
+  return options;
+}
+
+solver::RigValues MovedCameras::of_rig(solver::RigValues values) const {
+  values.T_cam_rig.resize(cameras_);
+  values.models.erase(values.models.begin() + static_cast<std::ptrdiff_t>(cameras_), values.models.end());
+  values.timing.resize(cameras_);
+  return values;
+}
+
+std::vector<camera::CameraMove> MovedCameras::moves_of(const solver::RigValues& values) const {
+  std::vector<camera::CameraMove> out = moves_;
+  for (std::size_t m = 0; m < out.size(); ++m)
+    out[m].T_after_before = values.T_cam_rig[cameras_ + m] * values.T_cam_rig[out[m].camera].inverse();
+  return out;
+}
+
+RigInformation MovedCameras::of_rig(const RigInformation& information) const {
+  if (moves_.empty()) return information;
+  const auto first = static_cast<Eigen::Index>(6 * (cameras_ - 1)), gone = static_cast<Eigen::Index>(6 * moves_.size());
+  std::vector<Eigen::Index> kept, removed;
+  for (Eigen::Index k = 0; k < information.change.size(); ++k)
+    (k >= first && k < first + gone ? removed : kept).push_back(k);
+  const auto marginal = [&](const Eigen::MatrixXd& of_all) -> Eigen::MatrixXd {
+    const Eigen::MatrixXd own = of_all(kept, kept), coupling = of_all(kept, removed), others = of_all(removed, removed);
+    return own - coupling * others.ldlt().solve(coupling.transpose());
+  };
+  return {information.change(kept), marginal(information.information), marginal(information.prior)};
+}
+
+void MovedCameras::separate(const map::BundledMap& map, RigProblem& problem) const {
+  if (moves_.empty()) return;
+  solver::ReprojectionProblem& flat = problem.flat.problem;
+  const auto time_of = [&](std::size_t pose) { return map.keyframe(problem.flat.keyframes[pose]).frame->time_ns; };
+  for (auto& o : flat.observations)
+    o.camera = CameraIndex(camera_at(o.camera.index(), time_of(static_cast<std::size_t>(o.pose))));
+  sort_observations(problem);
+  std::vector<SE3> motion;
+  for (std::size_t k = 0; k < flat.motion.size(); k += cameras_) {
+    for (std::size_t c = 0; c < cameras_; ++c) motion.push_back(flat.motion[k + c]);
+    for (const camera::CameraMove& move : moves_) motion.push_back(flat.motion[k + move.camera]);
+  }
+  flat.motion = std::move(motion);
+}
+
+void MovedCameras::join(const map::BundledMap& map, const solver::RigValues& values, RigProblem& problem) const {
+  if (moves_.empty()) return;
+  solver::ReprojectionProblem& flat = problem.flat.problem;
+  std::vector<SE3> motion;
+  for (std::size_t pose = 0; pose < problem.flat.keyframes.size(); ++pose) {
+    for (std::size_t c = 0; c < cameras_; ++c) {
+      const std::size_t now = camera_at(c, map.keyframe(problem.flat.keyframes[pose]).frame->time_ns);
+      SE3& T = motion.emplace_back();
+      if (now != c) T = values.T_cam_rig[c].inverse() * values.T_cam_rig[now];
+      if (!flat.motion.empty()) T = T * flat.motion[pose * (cameras_ + moves_.size()) + now];
+    }
+  }
+  flat.motion = std::move(motion);
+  for (auto& o : flat.observations) {
+    if (o.camera.index() >= cameras_) o.camera = CameraIndex(moves_[o.camera.index() - cameras_].camera);
+  }
+  sort_observations(problem);
+}
+
+std::optional<PossibleMove> MovedCameras::most_likely_move(const RigProblem& problem,
+                                                           const solver::RigValues& values) const {
+  const std::size_t poses = problem.flat.keyframes.size(), cameras = values.T_cam_rig.size();
+  std::vector<Equations> equations(poses * cameras);
+  for (const auto& o : problem.flat.problem.observations)
+    add(problem.flat.problem, values, o, equations[static_cast<std::size_t>(o.pose) * cameras + o.camera.index()]);
+  std::optional<PossibleMove> best;
+  // Of two cameras, the images show the relative extrinsics only.
+  for (std::size_t c = cameras_ == 2 ? 1 : 0; c < cameras; ++c) {
+    Equations all, after;
+    for (std::size_t pose = 0; pose < poses; ++pose) all.add_keyframe(equations[pose * cameras + c]);
+    for (std::size_t pose = poses; pose-- > 1;) {
+      after.add_keyframe(equations[pose * cameras + c]);
+      if (std::min(after.keyframes, all.keyframes - after.keyframes) < kMinKeyframes) continue;
+      const auto [change, chi2] = best_change(all, after);
+      if (std::isfinite(chi2) && (!best || chi2 > best->chi2)) best = PossibleMove{c, pose, change, chi2};
+    }
+  }
+  return best;
+}
+
+std::vector<camera::CameraMove> MovedCameras::at_best_times(const map::BundledMap& map, const RigProblem& problem,
+                                                            const solver::RigValues& values) const {
+  std::vector<camera::CameraMove> out = moves_of(values);
+  const std::size_t poses = problem.flat.keyframes.size();
+  for (std::size_t m = 0; m < out.size(); ++m) {
+    const std::size_t camera_before = before(m), camera_after = cameras_ + m;
+    std::vector<double> benefit(poses, 0);  // decrease of the cost if a pose was before the move, not after it
+    for (const Observation& o : problem.flat.problem.observations) {
+      if (o.camera.index() != camera_before && o.camera.index() != camera_after) continue;
+      benefit[static_cast<std::size_t>(o.pose)] +=
+          cost(problem.flat.problem, values, o, camera_after) - cost(problem.flat.problem, values, o, camera_before);
+    }
+    double sum = 0, most = 0;
+    for (std::size_t pose = 0; pose + 1 < poses; ++pose) {
+      sum += benefit[pose];
+      if (sum <= most) continue;
+      most = sum;
+      out[m].time_ns = map.keyframe(problem.flat.keyframes[pose + 1]).frame->time_ns;
+    }
+  }
+  std::ranges::stable_sort(out, {}, &camera::CameraMove::time_ns);
+  return out;
+}
+
+MovedCameras MovedCameras::with_move(std::vector<camera::CameraMove> moves, const PossibleMove& move,
+                                     TimeNs time_ns) const {
+  camera::CameraMove added{.camera = move.camera, .time_ns = time_ns, .T_after_before = {}};
+  if (move.camera >= cameras_)
+    added = {moves[move.camera - cameras_].camera, time_ns, moves[move.camera - cameras_].T_after_before};
+  moves.push_back(added);
+  std::ranges::stable_sort(moves, {}, &camera::CameraMove::time_ns);
+  return {cameras_, std::move(moves)};
+}
+
+}  // namespace bslam::calibration

@@ -1,0 +1,48 @@
+// The estimate of a calibration from a map: which observations are used, in how many adjustments, and whether a camera
+// was moved during the recording.
+#pragma once
+
+#include <memory>
+#include <stop_token>
+#include <vector>
+
+#include "calibration/moved_camera.h"
+#include "calibration/rig_problem.h"
+
+namespace bslam::calibration {
+
+struct EstimateInput {
+  const map::BundledMap& map;
+  const camera::Rig& calibrated;  // the given calibration
+  const CalibrationOptions& options;
+  const feature::FeatureModel& features;
+  const std::stop_token& stop;
+};
+
+struct RigEstimate {
+  MovedCameras cameras;
+  // The given calibration of these cameras, with the time offsets that were applied to the images of the map.
+  std::shared_ptr<const camera::Rig> reference;
+  RigProblem problem;  // poses and points belong to the estimate
+  RigAdjustment adjusted;
+  double path_before = 0;  // path_length() with the rig of the map
+};
+
+// The options for an estimate from a fraction of the map, which is enough for a verdict.
+CalibrationOptions quick(CalibrationOptions options);
+// Options of an adjustment from which only the verdict is used: coarser convergence, no effects on the poses.
+RigAdjustmentOptions for_verdict(RigAdjustmentOptions options);
+
+// The prior of all parameters that are estimated from the map. Times are constant unless the images contradict them.
+RigAdjustmentOptions prior_with_timing(const EstimateInput& input, const MovedCameras& cameras);
+
+// Estimates the calibration with the moves of cameras that are known.
+RigEstimate estimate_rig(const EstimateInput& input, const RigAdjustmentOptions& prior, MovedCameras cameras);
+
+// As estimate_rig, and searches for further moves.
+RigEstimate estimate_rig_and_moves(const EstimateInput& input, const RigAdjustmentOptions& prior, MovedCameras cameras);
+
+// The moves of an estimate.
+std::vector<MoveEstimate> moves_of(const RigEstimate& estimate);
+
+}  // namespace bslam::calibration

@@ -1,0 +1,158 @@
+#include "calibration/moved_camera.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <numbers>
+
+#include "adjustment/map_adjustment.h"
+#include "mapping/simulated_map.h"
+
+namespace bslam::calibration::moves {
+namespace {
+
+using geometry::SE3;
+
+constexpr feature::FeatureModel kFeatures{.sigma_px = 0.5, .pyramid = {}};
+constexpr double kDegree = std::numbers::pi / 180;
+const CalibrationOptions kIndependent{.correlated_observations = 1};
+constexpr int kKeyframes = 30;
+constexpr double kStep_s = 0.3;
+
+struct Moved {
+  std::size_t camera;
+  int keyframe;  // the first one after the move
+  SE3 T_after_before;
+};
+
+SE3 turn(const Eigen::Vector3d& degrees, const Eigen::Vector3d& metres = Eigen::Vector3d::Zero()) {
+  return SE3(geometry::so3_exp(kDegree * degrees), metres);
+}
+
+camera::Rig with_extrinsics(const camera::Rig& rig, const Moved& moved) {
+  std::vector<camera::RigCamera> cameras;
+  for (std::size_t c = 0; c < rig.size(); ++c) {
+    cameras.push_back({rig.camera(c), rig.body_from_cam(c)});
+    if (c == moved.camera)
+      cameras.back().T_body_cam = rig.body_from_rig() * (moved.T_after_before * rig.cam_from_rig(c)).inverse();
+  }
+  return camera::Rig(std::move(cameras));
+}
+
+synthetic::FeatureSimulator simulator(const camera::Rig& rig) {
+  synthetic::FeatureSimulatorOptions options;
+  options.landmarks = 2500;
+  options.max_keypoints = 250;
+  options.sigma_px = kFeatures.sigma_px;
+  return {rig, synthetic::make_orbit({.duration_s = 60}), options};
+}
+
+// A map of a rig of which one camera, not camera 0, was moved, adjusted as if it had not been.
+map::BundledMap map_of(const camera::Rig& rig, const Moved& moved) {
+  map::SimulatedMap out(simulator(rig));
+  for (int i = 0; i < kKeyframes; ++i) {
+    if (i == moved.keyframe) out.sim = simulator(with_extrinsics(rig, moved));
+    out.add_keyframe(FrameId(i), kStep_s * i);
+  }
+  adjustment::Selection all;
+  for (const KeyframeId k : out.map.keyframe_ids())
+    (k.value() == 0 ? all.fixed_keyframes : all.free_keyframes).push_back(k);
+  all.landmarks = out.map.landmark_ids();
+  map::MapDraft draft = out.draft();
+  EXPECT_TRUE(adjustment::adjust_map(all, {}, kFeatures, draft).done);
+  return draft.map();
+}
+
+RigRefinement refined(const map::BundledMap& map) { return refine_rig(map, map.rig(), kIndependent, kFeatures); }
+
+TimeNs time_of(const map::BundledMap& map, int keyframe) { return map.keyframe(KeyframeId(keyframe)).frame->time_ns; }
+
+TEST(MovedCamera, IsFoundWithTheTimeAndTheChangeOfItsExtrinsics) {
+  const camera::Rig rig = synthetic::default_rig();
+  for (const Moved& moved :
+       {Moved{1, 12, turn({0.1, -0.3, 0.1})}, Moved{1, 20, turn({0, 0.5, 0.2}, {0.004, 0, 0.002})}}) {
+    const map::BundledMap map = map_of(rig, moved);
+    const RigRefinement result = refined(map);
+    ASSERT_TRUE(result.done);
+    EXPECT_EQ(result.verdict, Verdict::kInconsistent);
+    ASSERT_EQ(result.moves.size(), 1u);
+    EXPECT_EQ(result.moves[0].camera, moved.camera);
+    EXPECT_EQ(result.moves[0].time_ns, time_of(map, moved.keyframe));
+    const double change_deg = geometry::degrees(geometry::so3_log(moved.T_after_before.rotation()).norm());
+    EXPECT_NEAR(result.moves[0].change_deg, change_deg, 0.03);
+    EXPECT_LT(result.moves[0].std_deg, 0.02);
+    ASSERT_EQ(result.rig->moves().size(), 1u);
+    EXPECT_LT(map::angle_rad(result.rig->moves()[0].T_after_before, moved.T_after_before), 0.03 * kDegree);
+    // The camera itself has the extrinsics before the move.
+    EXPECT_LT(map::angle_rad(result.rig->cam_from_rig(moved.camera), rig.cam_from_rig(moved.camera)), 0.05 * kDegree);
+  }
+}
+
+// With the moves that are known, no others are found, and the estimate stays as it is.
+TEST(MovedCamera, StaysAsItWasFound) {
+  const Moved moved{1, 12, turn({0, 0.4, 0})};
+  const map::BundledMap map = map_of(synthetic::default_rig(), moved);
+  const RigRefinement first = refined(map);
+  ASSERT_EQ(first.moves.size(), 1u);
+  map::MapDraft draft(std::make_shared<const map::BundledMap>(map));
+  apply(first, draft);
+  ASSERT_EQ(draft.map().rig().moves().size(), 1u);
+  const RigRefinement second = refine_rig(draft.map(), map.rig(), kIndependent, kFeatures);
+  ASSERT_EQ(second.moves.size(), 1u);
+  EXPECT_EQ(second.moves[0].time_ns, first.moves[0].time_ns);
+  EXPECT_NEAR(second.moves[0].change_deg, first.moves[0].change_deg, 0.01);
+  for (std::size_t c = 1; c < map.rig().size(); ++c)
+    EXPECT_LT(map::angle_rad(second.rig->cam_from_rig(c), first.rig->cam_from_rig(c)), 0.02 * kDegree) << c;
+}
+
+TEST(MovedCamera, IsNotFoundInMapsOfConstantRigs) {
+  const camera::Rig truth = synthetic::default_rig();
+  // The calibration of a camera is wrong from the beginning.
+  const map::BundledMap map = map_of(with_extrinsics(truth, {1, 0, turn({0.2, 0.5, 0})}), {1, kKeyframes, SE3()});
+  const RigRefinement result = refine_rig(map, truth, kIndependent, kFeatures);
+  ASSERT_TRUE(result.done);
+  EXPECT_EQ(result.verdict, Verdict::kInconsistent);
+  EXPECT_TRUE(result.moves.empty());
+}
+
+TEST(MovedCamera, OfARigOfTwoIsTheSecondOne) {
+  const Moved moved{1, 15, turn({0.3, 0, 0})};
+  const RigRefinement result = refined(map_of(synthetic::ring_rig(2), moved));
+  ASSERT_EQ(result.moves.size(), 1u);
+  EXPECT_EQ(result.moves[0].camera, 1u);
+}
+
+// The problem with moves as further cameras has the same errors as that with moves as motions.
+TEST(MovedCameras, SeparateAndJoinAreInverse) {
+  const map::BundledMap map = map_of(synthetic::default_rig(), {1, kKeyframes, SE3()});
+  const MovedCameras cameras(map.rig().size(), {{1, time_of(map, 10), turn({0.3, 0, 0})},
+                                                {3, time_of(map, 15), turn({0, 0.2, 0})},
+                                                {1, time_of(map, 20), turn({0, 0, 0.4})}});
+  EXPECT_EQ(cameras.before(0), 1u);
+  EXPECT_EQ(cameras.before(1), 3u);
+  EXPECT_EQ(cameras.before(2), map.rig().size());
+  const solver::RigValues values = cameras.added_to(solver::RigValues::of(map.rig()));
+  const camera::Rig rig = cameras.added_to(map.rig());
+  RigProblem problem = choose(map, false, kIndependent, kFeatures);
+  const std::vector<solver::ReprojectionProblem::Observation> original = problem.flat.problem.observations;
+  cameras.separate(map, problem);
+  problem.flat.problem.rig = &rig;
+  const auto errors = [&](const solver::RigValues& of_rig) {
+    const solver::ReprojectionProblem& flat = problem.flat.problem;
+    std::vector<double> out = solver::squared_errors(flat, flat.T_rig_world, flat.points, of_rig);
+    std::ranges::sort(out);
+    return out;
+  };
+  const std::vector<double> separate = errors(values);
+  cameras.join(map, values, problem);
+  problem.flat.problem.rig = &map.rig();
+  const std::vector<double> joined = errors(cameras.of_rig(values));
+  ASSERT_EQ(joined.size(), separate.size());
+  for (std::size_t i = 0; i < joined.size(); ++i) EXPECT_NEAR(joined[i], separate[i], 1e-6 * (1 + separate[i]));
+  ASSERT_EQ(problem.flat.problem.observations.size(), original.size());
+  for (std::size_t i = 0; i < original.size(); ++i)
+    EXPECT_EQ(problem.flat.problem.observations[i].camera, original[i].camera);
+}
+
+}  // namespace
+}  // namespace bslam::calibration::moves
