@@ -22,7 +22,7 @@ constexpr int kPasses = 4;
 constexpr double kCoarseDecrease = 1e-4;
 constexpr int kQuickKeyframes = 40, kQuickLandmarks = 1000;  // enough for a verdict
 
-constexpr int kMaxMoves = 3;        // found in one estimate
+constexpr int kMaxTries = 5;        // further moves that are tried; if others remain, moves are not the reason
 constexpr int kMaxCorrections = 3;  // of the times of moves
 // A move is accepted if the camera turned or was displaced by so many standard deviations and more than these bounds.
 // On recordings without moves, the estimates were below 0.035 degrees and 4.5 mm.
@@ -233,43 +233,26 @@ RigEstimate estimate_significant_moves(const EstimateInput& input, const RigAdju
   return estimate_at_best_times(input, prior_with_timing(input, fewer), std::move(fewer));
 }
 
-// The mean squared error of the observations in px^2; larger errors count as 3 px. It does not depend on their standard
-// deviations, which differ between estimates.
-double robust_error(const RigEstimate& estimate) {
-  constexpr double kTruncated_px2 = 9;
-  solver::ReprojectionProblem problem = estimate.problem.flat.problem;
-  for (auto& observation : problem.observations) observation.sigma = 1;
-  double sum = 0;
-  for (const double error_px2 :
-       solver::squared_errors(problem, problem.T_rig_world, problem.points, estimate.adjusted.values))
-    sum += error_px2 < kTruncated_px2 ? error_px2 : kTruncated_px2;
-  return sum / static_cast<double>(std::max<std::size_t>(1, problem.observations.size()));
-}
-
 }  // namespace
 
 RigEstimate estimate_rig_and_moves(const EstimateInput& input, const RigAdjustmentOptions& prior,
                                    MovedCameras cameras) {
-  RigEstimate best = cameras.moves().empty() ? estimate_rig(input, prior, std::move(cameras))
-                                             : estimate_significant_moves(input, prior, std::move(cameras));
+  RigEstimate known = cameras.moves().empty() ? estimate_rig(input, prior, std::move(cameras))
+                                              : estimate_significant_moves(input, prior, std::move(cameras));
   // The first moves that are tried may be at wrong times and be replaced by others.
-  std::optional<RigEstimate> last;
-  for (int i = 0; i < kMaxMoves && best.adjusted.done; ++i) {
-    const RigEstimate& before = last ? *last : best;
-    auto more = with_likely_move(input, before);
-    if (!more) break;
+  std::optional<RigEstimate> latest;
+  for (int i = 0; i < kMaxTries; ++i) {
+    const RigEstimate& before = latest ? *latest : known;
+    auto more = before.adjusted.done ? with_likely_move(input, before) : std::nullopt;
+    if (!more) return latest ? *std::move(latest) : std::move(known);
     // Its effect may have looked like wrong times, which are tested again.
     const RigAdjustmentOptions prior_with_move = prior_with_timing(input, *more);
     RigEstimate next = estimate_significant_moves(input, prior_with_move, std::move(*more));
-    if (!next.adjusted.done || same_times(next.cameras.moves(), before.cameras.moves())) break;
-    if (robust_error(next) < robust_error(best)) {
-      best = std::move(next);
-      last.reset();
-    } else {
-      last = std::move(next);
-    }
+    if (!next.adjusted.done || same_times(next.cameras.moves(), before.cameras.moves()))
+      return latest ? *std::move(latest) : std::move(known);
+    latest = std::move(next);
   }
-  return best;
+  return known;  // something else than moves
 }
 
 }  // namespace bslam::calibration

@@ -45,7 +45,7 @@ Rig::Rig(std::vector<RigCamera> cameras, const SE3& T_cam0_rig) {
   }
   T_cam_rig_.front() = T_cam0_rig;
   T_rig_cam_.front() = T_cam0_rig.inverse();
-  Calibration calibration{{}, measured_overlap(cameras), {}, {}};
+  Calibration calibration{{}, measured_overlap(cameras), {}};
   for (const RigCamera& c : cameras) calibration.min_axis_cosine.push_back(min_axis_cosine_of(c.camera));
   calibration.cameras = std::move(cameras);
   calibration_ = std::make_shared<const Calibration>(std::move(calibration));
@@ -99,28 +99,25 @@ Rig Rig::subset(std::span<const int> indices) const {
     BSLAM_ASSERT(i >= 0 && static_cast<std::size_t>(i) < size(), "the camera index must be within the rig");
     chosen.push_back(calibration_->cameras[static_cast<std::size_t>(i)]);
   }
-  std::vector<CameraMove> moves;
-  for (const CameraMove& move : calibration_->moves) {
+  std::vector<CameraMove> chosen_moves;
+  for (const CameraMove& move : moves()) {
     const auto found = std::ranges::find(indices, static_cast<int>(move.camera));
     if (found != indices.end())
-      moves.push_back({static_cast<std::size_t>(found - indices.begin()), move.time_ns, move.T_after_before});
+      chosen_moves.push_back({static_cast<std::size_t>(found - indices.begin()), move.time_ns, move.T_after_before});
   }
-  return Rig(std::move(chosen), indices.front() == 0 ? cam_from_rig(0) : SE3()).with_moves(std::move(moves));
+  return Rig(std::move(chosen), indices.front() == 0 ? cam_from_rig(0) : SE3()).with_moves(std::move(chosen_moves));
 }
 
 Rig Rig::with_moves(std::vector<CameraMove> moves) const {
-  if (moves.empty() && calibration_->moves.empty()) return *this;
   std::ranges::stable_sort(moves, {}, &CameraMove::time_ns);
-  Calibration calibration = *calibration_;
-  calibration.moves = std::move(moves);
   Rig out = *this;
-  out.calibration_ = std::make_shared<const Calibration>(std::move(calibration));
+  out.moves_ = moves.empty() ? nullptr : std::make_shared<const std::vector<CameraMove>>(std::move(moves));
   return out;
 }
 
 const CameraMove* Rig::move_at(std::size_t i, TimeNs time_ns) const {
   const CameraMove* last = nullptr;
-  for (const CameraMove& move : calibration_->moves) {
+  for (const CameraMove& move : moves()) {
     if (move.camera == i && move.time_ns <= time_ns) last = &move;
   }
   return last;
@@ -133,7 +130,8 @@ SE3 Rig::cam_from_rig_at(std::size_t i, TimeNs time_ns) const {
 
 Rig Rig::at(TimeNs time_ns) const {
   Rig out = *this;
-  for (std::size_t i = 0; i < size() && !calibration_->moves.empty(); ++i) {
+  out.moves_ = nullptr;
+  for (std::size_t i = 0; i < size() && moves_; ++i) {
     out.T_cam_rig_[i] = cam_from_rig_at(i, time_ns);
     out.T_rig_cam_[i] = out.T_cam_rig_[i].inverse();
   }
@@ -141,7 +139,7 @@ Rig Rig::at(TimeNs time_ns) const {
 }
 
 Rig Rig::after_moves() const {
-  if (calibration_->moves.empty()) return *this;
+  if (!moves_) return *this;
   const Rig last = at(std::numeric_limits<TimeNs>::max());
   std::vector<RigCamera> cameras;
   for (std::size_t i = 0; i < size(); ++i) cameras.push_back({camera(i), body_from_rig() * last.rig_from_cam(i)});
@@ -159,15 +157,14 @@ Rig Rig::with_calibration_of(const Rig& part, std::span<const int> indices) cons
     camera.camera.time_offset_ns = part.camera(i).time_offset_ns;
     camera.T_body_cam = part.body_from_cam(i);
   }
-  // The moves of the others stay.
-  std::vector<CameraMove> moves;
-  for (const CameraMove& move : calibration_->moves) {
-    if (std::ranges::find(indices, static_cast<int>(move.camera)) == indices.end()) moves.push_back(move);
+  std::vector<CameraMove> all_moves;  // those of the other cameras, then those of the part
+  for (const CameraMove& move : moves()) {
+    if (std::ranges::find(indices, static_cast<int>(move.camera)) == indices.end()) all_moves.push_back(move);
   }
   for (const CameraMove& move : part.moves())
-    moves.push_back({static_cast<std::size_t>(indices[move.camera]), move.time_ns, move.T_after_before});
+    all_moves.push_back({static_cast<std::size_t>(indices[move.camera]), move.time_ns, move.T_after_before});
   const bool same_first = !indices.empty() && indices.front() == 0;
-  return Rig(std::move(cameras), same_first ? part.cam_from_rig(0) : cam_from_rig(0)).with_moves(std::move(moves));
+  return Rig(std::move(cameras), same_first ? part.cam_from_rig(0) : cam_from_rig(0)).with_moves(std::move(all_moves));
 }
 
 bool Rig::same_intrinsics(const Rig& other) const {

@@ -64,9 +64,9 @@ class Rig {
 
   // The moves of cameras during the recording, in order of time; usually there are none. All other functions give the
   // extrinsics at its beginning.
-  std::span<const CameraMove> moves() const { return calibration_->moves; }
+  std::span<const CameraMove> moves() const { return moves_ ? std::span(*moves_) : std::span<const CameraMove>(); }
   Rig with_moves(std::vector<CameraMove> moves) const;
-  // T_cam_rig of a camera at a time, and the rig with the extrinsics of a time.
+  // T_cam_rig of a camera at a time, and the rig with the extrinsics of a time, which has no moves.
   geometry::SE3 cam_from_rig_at(std::size_t i, TimeNs time_ns) const;
   Rig at(TimeNs time_ns) const;
   // The rig as it is after all moves, as a rig without moves.
@@ -86,8 +86,9 @@ class Rig {
 
   // The same cameras, with the frame of camera 0 as the rig frame.
   Rig in_frame_of_camera_0() const {
-    return T_cam_rig_.front().matrix().isIdentity(0) ? *this
-                                                     : Rig(calibration_->cameras).with_moves(calibration_->moves);
+    return T_cam_rig_.front().matrix().isIdentity(0)
+               ? *this
+               : Rig(calibration_->cameras).with_moves({moves().begin(), moves().end()});
   }
   // Returns the rig that consists of the given cameras, in the given order; the first becomes camera 0. The indices
   // must be valid and distinct.
@@ -114,12 +115,12 @@ class Rig {
     std::vector<RigCamera> cameras;
     std::vector<double> overlap;          // (N, N) row-major
     std::vector<double> min_axis_cosine;  // per camera
-    std::vector<CameraMove> moves;
   };
   const CameraMove* move_at(std::size_t i, TimeNs time_ns) const;  // the last one of a camera until a time, or null
   std::vector<double> measured_overlap(const std::vector<RigCamera>& cameras) const;
 
   std::shared_ptr<const Calibration> calibration_;
+  std::shared_ptr<const std::vector<CameraMove>> moves_;  // null: none
   std::vector<geometry::SE3> T_cam_rig_, T_rig_cam_;
   static const Shutter kGlobalShutter;
   std::vector<Shutter> shutters_;  // per camera; empty if none is rolling

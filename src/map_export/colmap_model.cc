@@ -192,11 +192,12 @@ std::vector<std::string> notes_of(const Selection& selection, const ImageTable& 
   std::vector<std::string> notes;
   const camera::Rig& rig = selection.map->rig();
   if (shift_px > kMaxRigidShift_px) {
-    notes.push_back(
-        fmt::format("the images of a keyframe were taken at different times, which moves landmarks by up to {:.1f} px; "
-                    "COLMAP's rigs "
-                    "are rigid, so every camera is a rig of its own",
-                    shift_px));
+    notes.push_back(fmt::format(
+        "{}, which moves landmarks by up to {:.1f} px; COLMAP's rigs are rigid, so every camera is a rig of "
+        "its own",
+        rig.moves().empty() ? "the images of a keyframe were taken at different times"
+                            : "cameras were moved relative to each other",
+        shift_px));
   }
   for (std::size_t c = 0; c < rig.size(); ++c) {
     if (rig.camera(c).readout_s == 0) continue;

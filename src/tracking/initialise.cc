@@ -6,6 +6,7 @@
 #include "base/median.h"
 #include "estimators/generalised_scale.h"
 #include "feature/descriptor_matching.h"
+#include "frame/rig_at.h"
 
 namespace bslam::tracking {
 namespace {
@@ -135,7 +136,8 @@ std::optional<StartedMap> initialise_monocular(const StartCandidate& first, cons
                                                std::span<const image::Pyramid> pyramids,
                                                const InitialisationOptions& options, Random random,
                                                map::MapDraft& draft) {
-  const camera::Rig& rig = draft.map().rig();
+  const frame::RigAt rig_at(draft.map().rig(), frame);
+  const camera::Rig& rig = *rig_at;
   const FramePairs pairs = match_cameras(*first.frame, frame);
   const auto view = best_two_view(pairs, options, random.next());
   if (!view) return std::nullopt;

@@ -7,6 +7,7 @@
 #include <map>
 
 #include "base/median.h"
+#include "frame/rig_at.h"
 #include "geometry/triangulation.h"
 #include "map/keyframe_landmarks.h"
 #include "map/local_view.h"
@@ -80,7 +81,8 @@ std::vector<KeyframeId> keyframes_that_share(const map::BundledMap& map, const s
 // The fraction of the landmarks of a keyframe that are in some image of the frame.
 double share_in_view(const map::BundledMap& map, KeyframeId keyframe, const frame::BundledFrame& frame,
                      const geometry::SE3& T_rig_world) {
-  const camera::Rig& rig = map.rig();
+  const frame::RigAt rig_at(map.rig(), frame);
+  const camera::Rig& rig = *rig_at;
   const auto in_view = [&](const Eigen::Vector3d& p_rig) {
     for (std::size_t c = 0; c < rig.size(); ++c) {
       if (!present(frame, c)) continue;

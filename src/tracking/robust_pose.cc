@@ -8,6 +8,7 @@
 
 #include "base/median.h"
 #include "estimators/pose_ransac.h"
+#include "frame/rig_at.h"
 #include "tracking/image_cells.h"
 #include "tracking/scene_agreement.h"
 
@@ -288,7 +289,8 @@ std::vector<std::uint8_t> agreeing_beyond_chance(const camera::Rig& rig,
 ChosenPose robust_pose(const TrackInput& input, const frame::BundledFrame& frame, const FrameMatches& matches,
                        std::span<const solver::PoseObservation> observations, const geometry::SE3& predicted,
                        const solver::MotionModel& motion, const solver::PoseSolverOptions& options) {
-  const camera::Rig& rig = input.map.rig();
+  const frame::RigAt rig_at(input.map.rig(), frame);
+  const camera::Rig& rig = *rig_at;
   solver::PoseSolution first = solver::solve_pose(rig, observations, predicted, motion, options);
   if (!few(first, kFewInliers, observations.size())) return {.solution = std::move(first)};
   solver::PoseSolverOptions near_start = options;

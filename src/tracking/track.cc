@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <numeric>
 
+#include "frame/rig_at.h"
 #include "tracking/keyframe_decision.h"
 #include "tracking/motion_prediction.h"
 #include "tracking/robust_pose.h"
@@ -70,7 +71,8 @@ bool track_in_narrow_windows(const TrackInput& input, const std::vector<Landmark
       for (std::size_t c = 0; c < wrong.size(); ++c) excluded[c] |= wrong[c];
       drop(excluded, found);
       observations = pose_observations(map, frame, found, input.features);
-      solution = solver::solve_pose(map.rig(), observations, consistent.T_rig_world, motion, options.pose);
+      const frame::RigAt resting(map.rig(), frame);
+      solution = solver::solve_pose(*resting, observations, consistent.T_rig_world, motion, options.pose);
     }
   }
   if (!supported(solution, observations.size(), options.min_inliers, options)) return false;
@@ -246,8 +248,9 @@ bool coarse_pose_confirmed(const TrackInput& input, const Coarse& coarse, const 
       index.push_back(at);
     }
   }
-  const auto agrees = agreeing_beyond_chance(input.map.rig(), observations, window_px, coarse.T_rig_world,
-                                             motion_model(input, coarse.frame));
+  const frame::RigAt resting(input.map.rig(), coarse.frame);
+  const auto agrees =
+      agreeing_beyond_chance(*resting, observations, window_px, coarse.T_rig_world, motion_model(input, coarse.frame));
   int agreeing = 0, of_fine = 0;
   for (std::size_t k = 0; k < agrees.size(); ++k) {
     agreeing += agrees[k];

@@ -156,6 +156,7 @@ TEST(Rig, HasTheExtrinsicsOfEveryTime) {
     }
     EXPECT_LT(difference(then.cam_from_rig(1), before_1 * rig.cam_from_rig(1)), 1e-15) << t;
     EXPECT_LT(difference(then.cam_from_rig(0), before_0), 1e-15) << t;
+    EXPECT_TRUE(then.moves().empty());
     EXPECT_LT(difference(then.rig_from_cam(1), then.cam_from_rig(1).inverse()), 1e-15) << t;
     EXPECT_LT(difference(then.cam_from_rig(2), rig.cam_from_rig(2)), 1e-15) << t;
     EXPECT_LT(difference(rig.cam_from_rig_at(1, t), then.cam_from_rig(1)), 1e-15) << t;
