@@ -31,9 +31,11 @@ class BSLAM_EXPORT MapView {
     // is the camera of rig(), by which landmarks project into the images. After a refinement of the calibration it may
     // be rotated against RigFrame::kCamera0, to which FrameResult::T_world_cam0 and trajectories refer.
     Pose T_world_cam0;
-    int parent = -1;    // id of its parent in the submap's spanning tree; -1 for the root
-    int submap = -1;    // id of the root keyframe of its submap
-    Pose T_world_body;  // of the body frame; T_world_body * rig().camera(i).T_body_cam is the pose of its camera i
+    int parent = -1;  // id of its parent in the submap's spanning tree; -1 for the root
+    int submap = -1;  // id of the root keyframe of its submap
+    // Of the body frame; T_world_body * rig().camera(i).T_body_cam is the pose of its camera i, unless this camera was
+    // moved on the body during the recording.
+    Pose T_world_body;
   };
   struct Landmark {
     int id = -1;
@@ -65,7 +67,8 @@ class BSLAM_EXPORT MapView {
   std::size_t num_landmarks() const;
   std::size_t num_observations() const;
   // All cameras of the map, without masks: those of the first run, then those of other rigs that have continued the
-  // map. Calibrations that were refined are those after the refinement.
+  // map. Calibrations that were refined are those after the refinement; the extrinsics of a camera that was moved
+  // during the recording are those before the move.
   Rig rig() const;
 
   std::vector<Keyframe> keyframes() const;  // in order of id

@@ -47,8 +47,8 @@ void add_landmark(const map::BundledMap& map, LandmarkId id, const std::vector<i
 }
 
 // Motion of the rig between each keyframe's time and the capture times of its images; empty if all images of all
-// keyframes were captured at the same time, and no camera was moved. A move of a camera, T_after_before T_cam_rig, is
-// the motion T_cam_rig^-1 T_after_before T_cam_rig of the rig as this camera sees it.
+// keyframes were captured at the same time, and no camera was moved. A move of a camera, T_after_initial T_cam_rig, is
+// the motion T_cam_rig^-1 T_after_initial T_cam_rig of the rig as this camera sees it.
 std::vector<geometry::SE3> motions(const map::BundledMap& map, const std::vector<KeyframeId>& keyframes) {
   std::vector<geometry::SE3> out;
   bool any = false;

@@ -71,8 +71,10 @@ std::vector<MapView::Keyframe> MapView::keyframes() const {
     const std::size_t camera_0 = camera_0_of(keyframe, first_of_rig);
     const geometry::SE3 T_cam0_rig = map.rig().cam_from_rig_at(camera_0, keyframe.frame->time_ns);
     const geometry::SE3 T_world_cam0 = (T_cam0_rig * keyframe.T_rig_world).inverse();
+    // The body does not move with a camera that moves on it.
+    const geometry::SE3 T_world_body = (map.rig().body_from_rig() * keyframe.T_rig_world).inverse();
     out.push_back({k.value(), keyframe.frame->time_ns, api::to_pose(T_world_cam0), keyframe.parent.value(),
-                   submap[k.index()], api::to_pose(T_world_cam0 * map.rig().body_from_cam(camera_0).inverse())});
+                   submap[k.index()], api::to_pose(T_world_body)});
   }
   return out;
 }

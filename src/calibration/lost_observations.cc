@@ -39,11 +39,11 @@ std::vector<std::uint8_t> taken_keypoints(const map::BundledMap& map, KeyframeId
 }
 
 // Observations of the problem per image (pose, camera).
-std::vector<std::vector<Observation>> observations_by_image(const solver::ReprojectionProblem& problem) {
-  std::vector<std::vector<Observation>> out(problem.T_rig_world.size() * problem.rig->size());
-  for (const Observation& o : problem.observations) {
-    out[static_cast<std::size_t>(o.pose) * problem.rig->size() + o.camera.index()].push_back(o);
-  }
+std::vector<std::vector<Observation>> observations_by_image(const solver::ReprojectionProblem& problem,
+                                                            std::size_t cameras) {
+  std::vector<std::vector<Observation>> out(problem.T_rig_world.size() * cameras);
+  for (const Observation& o : problem.observations)
+    out[static_cast<std::size_t>(o.pose) * cameras + o.camera.index()].push_back(o);
   return out;
 }
 
@@ -101,7 +101,7 @@ int recover_observations(const map::BundledMap& map, const camera::Rig& rig, con
                          adjustment::BundleProblem& flat) {
   const solver::ReprojectionProblem& problem = flat.problem;
   const std::size_t cameras = rig.size(), before = problem.observations.size();
-  const auto seen = observations_by_image(problem);
+  const auto seen = observations_by_image(problem, cameras);
   std::vector<matching::SearchPoint> points = map::search_points(map, flat.landmarks);
   for (std::size_t i = 0; i < points.size(); ++i) points[i].position = problem.points[i];
   std::vector<geometry::SE3> T_cam_world(cameras);

@@ -120,7 +120,7 @@ camera::Rig MovedCameras::added_to(const camera::Rig& rig) const {
 
 solver::RigValues MovedCameras::added_to(solver::RigValues values) const {
   for (const camera::CameraMove& move : moves_) {
-    values.T_cam_rig.push_back(move.T_after_before * values.T_cam_rig[move.camera]);
+    values.T_cam_rig.push_back(move.T_after_initial * values.T_cam_rig[move.camera]);
     values.models.push_back(values.models[move.camera]);
     values.timing.push_back(values.timing[move.camera]);
   }
@@ -148,7 +148,7 @@ solver::RigValues MovedCameras::of_rig(solver::RigValues values) const {
 std::vector<camera::CameraMove> MovedCameras::moves_of(const solver::RigValues& values) const {
   std::vector<camera::CameraMove> out = moves_;
   for (std::size_t m = 0; m < out.size(); ++m)
-    out[m].T_after_before = values.T_cam_rig[cameras_ + m] * values.T_cam_rig[out[m].camera].inverse();
+    out[m].T_after_initial = values.T_cam_rig[cameras_ + m] * values.T_cam_rig[out[m].camera].inverse();
   return out;
 }
 
@@ -199,25 +199,26 @@ void MovedCameras::join(const map::BundledMap& map, const solver::RigValues& val
   sort_observations(problem);
 }
 
-std::optional<PossibleMove> MovedCameras::most_likely_move(const RigProblem& problem,
-                                                           const solver::RigValues& values) const {
+std::vector<PossibleMove> MovedCameras::likely_moves(const RigProblem& problem, const solver::RigValues& values) const {
   const std::size_t poses = problem.flat.keyframes.size(), cameras = values.T_cam_rig.size();
   std::vector<Equations> equations(poses * cameras);
   for (const auto& o : problem.flat.problem.observations)
     add(problem.flat.problem, values, o, equations[static_cast<std::size_t>(o.pose) * cameras + o.camera.index()]);
-  std::optional<PossibleMove> best;
+  std::vector<PossibleMove> out;
   // Of two cameras, the images show the relative extrinsics only.
   for (std::size_t c = cameras_ == 2 ? 1 : 0; c < cameras; ++c) {
     Equations all, after;
+    PossibleMove best{.camera = c};
     for (std::size_t pose = 0; pose < poses; ++pose) all.add_keyframe(equations[pose * cameras + c]);
     for (std::size_t pose = poses; pose-- > 1;) {
       after.add_keyframe(equations[pose * cameras + c]);
       if (std::min(after.keyframes, all.keyframes - after.keyframes) < kMinKeyframes) continue;
       const auto [change, chi2] = best_change(all, after);
-      if (std::isfinite(chi2) && (!best || chi2 > best->chi2)) best = PossibleMove{c, pose, change, chi2};
+      if (std::isfinite(chi2) && chi2 > best.chi2) best = {c, pose, change, chi2};
     }
+    if (best.chi2 > 0) out.push_back(best);
   }
-  return best;
+  return out;
 }
 
 std::vector<camera::CameraMove> MovedCameras::at_best_times(const map::BundledMap& map, const RigProblem& problem,
@@ -244,11 +245,11 @@ std::vector<camera::CameraMove> MovedCameras::at_best_times(const map::BundledMa
   return out;
 }
 
-MovedCameras MovedCameras::with_move(std::vector<camera::CameraMove> moves, const PossibleMove& move,
-                                     TimeNs time_ns) const {
-  camera::CameraMove added{.camera = move.camera, .time_ns = time_ns, .T_after_before = {}};
+MovedCameras MovedCameras::with_move(const solver::RigValues& values, const PossibleMove& move, TimeNs time_ns) const {
+  std::vector<camera::CameraMove> moves = moves_of(values);
+  camera::CameraMove added{.camera = move.camera, .time_ns = time_ns, .T_after_initial = {}};
   if (move.camera >= cameras_)
-    added = {moves[move.camera - cameras_].camera, time_ns, moves[move.camera - cameras_].T_after_before};
+    added = {moves[move.camera - cameras_].camera, time_ns, moves[move.camera - cameras_].T_after_initial};
   moves.push_back(added);
   std::ranges::stable_sort(moves, {}, &camera::CameraMove::time_ns);
   return {cameras_, std::move(moves)};

@@ -1,7 +1,6 @@
 // Cameras that were moved relative to the rig during a recording, because they were hit or their mounts slipped.
 #pragma once
 
-#include <optional>
 #include <vector>
 
 #include "calibration/rig_bundle_adjustment.h"
@@ -42,21 +41,21 @@ class MovedCameras {
   // The information about the N cameras, with the extrinsics of the others marginalised out.
   RigInformation of_rig(const RigInformation& information) const;
 
-  // Assigns observations to the added cameras; the inverse assigns them to those of the rig, with the moves according
-  // to `values` as motions.
+  // Assigns observations to the added cameras, and assigns them to those of the rig again. Then the motions of the
+  // problem contain the moves according to `values`.
   void separate(const map::BundledMap& map, RigProblem& problem) const;
   void join(const map::BundledMap& map, const solver::RigValues& values, RigProblem& problem) const;
 
-  // The most likely further move, whether it happened or not; nullopt if no camera has enough observations before and
-  // after a keyframe. `values`: the optimum for constant extrinsics. There the derivative of the cost with respect to
-  // the extrinsics of a camera is zero, but if the camera moved, those of the parts before and after the move have
-  // opposite signs (docs/math.md, section 5).
-  std::optional<PossibleMove> most_likely_move(const RigProblem& problem, const solver::RigValues& values) const;
+  // The most likely further move of each camera of the problem, whether it happened or not, if it has enough
+  // observations before and after a keyframe. `values`: the optimum for constant extrinsics. There the derivative of
+  // the cost with respect to the extrinsics of a camera is zero, but if the camera moved, those of the parts before and
+  // after the move have opposite signs (docs/math.md, section 16).
+  std::vector<PossibleMove> likely_moves(const RigProblem& problem, const solver::RigValues& values) const;
   // The moves that the values show, each before the keyframe for which its extrinsics before and after it fit best.
   std::vector<camera::CameraMove> at_best_times(const map::BundledMap& map, const RigProblem& problem,
                                                 const solver::RigValues& values) const;
-  // Adds it to `moves`. It begins without a change of the extrinsics.
-  MovedCameras with_move(std::vector<camera::CameraMove> moves, const PossibleMove& move, TimeNs time_ns) const;
+  // The moves that the values show, and a further one, which begins without a change of the extrinsics.
+  MovedCameras with_move(const solver::RigValues& values, const PossibleMove& move, TimeNs time_ns) const;
 
  private:
   std::size_t camera_at(std::size_t camera, TimeNs time_ns) const;  // the camera of the problem

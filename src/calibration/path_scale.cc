@@ -56,7 +56,7 @@ void keep_scale(const CalibrationOptions& options, RigRefinement& refinement) {
   solver::RigValues values = solver::RigValues::of(refinement.rig->in_frame_of_camera_0());
   for (geometry::SE3& T : values.T_cam_rig) T = geometry::scaled(T, factor);
   std::vector<camera::CameraMove> moves(refinement.rig->moves().begin(), refinement.rig->moves().end());
-  for (camera::CameraMove& move : moves) move.T_after_before = geometry::scaled(move.T_after_before, factor);
+  for (camera::CameraMove& move : moves) move.T_after_initial = geometry::scaled(move.T_after_initial, factor);
   refinement.rig = with_rig_frame(values.applied_to(*refinement.rig), refinement.rig->cam_from_rig(0),
                                   refinement.rig->body_from_rig())
                        .with_moves(std::move(moves));

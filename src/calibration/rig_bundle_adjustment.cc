@@ -56,6 +56,13 @@ std::unique_ptr<solver::TimingBlock> make_timing(const RigAdjustmentOptions& opt
   return std::make_unique<solver::TimingBlock>(std::move(prior), options.shared);
 }
 
+// The number of cameras that are not another one after a move, which are the first ones.
+std::size_t num_cameras_of_rig(const solver::RigValues& calibrated, const RigAdjustmentOptions& options) {
+  std::size_t n = 0;
+  while (n < calibrated.models.size() && solver::has_own_unknowns(options.shared, n)) ++n;
+  return n;
+}
+
 solver::ExtrinsicPrior extrinsic_prior(const solver::RigValues& calibrated, const RigAdjustmentOptions& options,
                                        double tighter, std::vector<std::uint8_t> displaced = {}) {
   return {.T_cam_rig = calibrated.T_cam_rig,
@@ -63,6 +70,7 @@ solver::ExtrinsicPrior extrinsic_prior(const solver::RigValues& calibrated, cons
           .sigma_translation = tighter * options.sigma_translation,
           .sigma_depth = tighter * options.sigma_depth,
           .sigma_scale = tighter * options.sigma_scale,
+          .with_baseline = num_cameras_of_rig(calibrated, options),
           .displaced = std::move(displaced)};
 }
 
@@ -241,9 +249,9 @@ bool assess(solver::BundleEquations& equations, const CalibrationBlocks& blocks,
 }
 
 // Multiplies all lengths by a factor that gives the baselines the scale of the calibration; returns it.
-double restore_scale(const solver::RigValues& calibrated, std::span<const std::uint8_t> displaced,
-                     solver::ReprojectionProblem& problem, solver::BundleState& state) {
-  const double factor = 1.0 / solver::baseline_scale(state.rig.T_cam_rig, calibrated.T_cam_rig, displaced);
+double restore_scale(const solver::ExtrinsicPrior& prior, solver::ReprojectionProblem& problem,
+                     solver::BundleState& state) {
+  const double factor = 1.0 / solver::baseline_scale(state.rig.T_cam_rig, prior);
   for (geometry::SE3& T : state.rig.T_cam_rig) T = geometry::scaled(T, factor);
   for (geometry::SE3& T : state.T_rig_world) T = geometry::scaled(T, factor);
   for (geometry::Vector3d& point : state.points) point *= factor;
@@ -327,7 +335,8 @@ RigAdjustment adjust_rig(solver::ReprojectionProblem& problem, const RigAdjustme
     flagged = flags;
     blocks = make_blocks(calibrated, options, flagged);
     if (!run_round(scaled, round, blocks, calibrated, options, stop, skipped, state, out)) return out;
-    if (options.sigma_scale > 0) out.scale_change *= restore_scale(calibrated, flagged, scaled, state);
+    if (options.sigma_scale > 0)
+      out.scale_change *= restore_scale(extrinsic_prior(calibrated, options, 1.0, flagged), scaled, state);
   }
   if (!out.done) return out;
   out.values = std::move(state.rig);

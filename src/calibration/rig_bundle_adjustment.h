@@ -48,7 +48,8 @@ struct CameraEstimate {
   // this degree of freedom appear in `change`. A common scale of all baselines is not observed unless the scale is
   // determined otherwise.
   std::array<bool, 6> observed = {};
-  // Change, standard deviation and observability of the intrinsics; empty if they are constant.
+  // Change, standard deviation and observability of the intrinsics; empty if they are constant, or those of another
+  // camera (RigAdjustmentOptions::shared).
   camera::ModelParameters intrinsics_change, intrinsics_sigma;
   std::vector<bool> intrinsics_observed;
   // Differences to the prior's timing, and standard deviations, in seconds; 0 if constant.

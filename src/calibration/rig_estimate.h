@@ -1,5 +1,4 @@
-// The estimate of a calibration from a map: which observations are used, in how many adjustments, and whether a camera
-// was moved during the recording.
+// The estimate of a calibration from a map: which observations are used, and in how many adjustments.
 #pragma once
 
 #include <memory>
@@ -38,11 +37,5 @@ RigAdjustmentOptions prior_with_timing(const EstimateInput& input, const MovedCa
 
 // Estimates the calibration with the moves of cameras that are known.
 RigEstimate estimate_rig(const EstimateInput& input, const RigAdjustmentOptions& prior, MovedCameras cameras);
-
-// As estimate_rig, and searches for further moves.
-RigEstimate estimate_rig_and_moves(const EstimateInput& input, const RigAdjustmentOptions& prior, MovedCameras cameras);
-
-// The moves of an estimate.
-std::vector<MoveEstimate> moves_of(const RigEstimate& estimate);
 
 }  // namespace bslam::calibration

@@ -1,13 +1,13 @@
 #include "calibration/rig_refinement.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
 #include "calibration/calibration_prior.h"
+#include "calibration/deviation.h"
+#include "calibration/move_search.h"
 #include "calibration/path_scale.h"
-#include "calibration/rig_estimate.h"
 #include "calibration/rig_frame.h"
 #include "calibration/single_view_landmarks.h"
 #include "calibration/unobserved_cameras.h"
@@ -19,16 +19,6 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 constexpr double kMillimetresPerMetre = 1000.0, kMillisecondsPerSecond = 1000.0;
-
-// Square root of the largest eigenvalue.
-double largest_deviation(const Matrix3d& covariance) {
-  return std::sqrt(
-      Eigen::SelfAdjointEigenSolver<Matrix3d>(covariance, Eigen::EigenvaluesOnly).eigenvalues().maxCoeff());
-}
-
-double mahalanobis_distance(const Vector3d& change, const Matrix3d& covariance) {
-  return std::sqrt(change.dot(covariance.llt().solve(change)));
-}
 
 std::vector<ParameterRefinement> evaluate_intrinsics(const CameraEstimate& estimate, const camera::CameraModel& model) {
   std::vector<ParameterRefinement> out;
@@ -114,7 +104,13 @@ RigRefinement evaluate(const EstimateInput& input, RigEstimate&& estimate) {
   out.keyframes = estimate.problem.flat.keyframes.size();
   out.landmarks = estimate.problem.flat.landmarks.size();
   if (!adjusted.done) return out;
-  complete_unobserved_cameras(*estimate.reference, adjusted);
+  const camera::Rig reference = with_time_offsets_of(input.map.rig(), input.calibrated);
+  const std::vector<camera::CameraMove>& of_estimate = estimate.cameras.moves();
+  for (std::size_t m = 0; m < of_estimate.size(); ++m) {
+    const CameraEstimate& after = adjusted.cameras[reference.size() + m];
+    adjusted.cameras[of_estimate[m].camera].observations += after.observations;
+  }
+  complete_unobserved_cameras(reference, adjusted);
   out.done = true;
   for (std::size_t c = 0; c < input.map.rig().size(); ++c) {
     CameraRefinement& camera = out.cameras.emplace_back();
@@ -130,7 +126,6 @@ RigRefinement evaluate(const EstimateInput& input, RigEstimate&& estimate) {
   out.information = estimate.cameras.of_rig(adjusted.information);
   evaluate_scale(input, estimate, out);
   const std::vector<camera::CameraMove> moves = estimate.cameras.moves_of(adjusted.values);
-  const camera::Rig reference = with_time_offsets_of(input.map.rig(), input.calibrated);
   const camera::Rig refined = estimate.cameras.of_rig(adjusted.values).applied_to(reference);
   const geometry::SE3 T_cam0_rig =
       turn_of_rays(refined.camera(0), reference.camera(0)) * input.calibrated.cam_from_rig(0);
@@ -211,8 +206,9 @@ void move_submap(KeyframeId keyframe, const geometry::SE3& T_rig_world, map::Map
 namespace {
 
 // Returns L, (n, n + 1) for the n unknowns of RigInformation: the first n columns are a square root of the covariance
-// of the estimate, the last one is the change of the camera translations that keep_scale() withheld. Returns null if
-// the information is not positive definite.
+// of the estimate, the last one is the change of the camera translations that keep_scale() withheld. The extrinsics are
+// those before moves of cameras; their deviation is taken for those after them as well. Returns null if the information
+// is not positive definite.
 std::shared_ptr<const Eigen::MatrixXd> deviation_of(const RigRefinement& refinement) {
   const Eigen::LLT<Eigen::MatrixXd> factor(refinement.information.information);
   if (factor.info() != Eigen::Success) return nullptr;

@@ -10,7 +10,8 @@ namespace bslam::calibration {
 // extrinsics are relative to the axes of camera 0 under the given intrinsics. If the estimated intrinsics rotate the
 // ray of the image centre by R_given_estimated, an unobserved camera has
 //     T_cam_rig = T_cam_rig,given R_given_estimated.
-// With the given extrinsics it would be inconsistent with the other cameras.
+// With the given extrinsics it would be inconsistent with the other cameras. Cameras of the estimate that `given` does
+// not have, which are those after a move (moved_camera.h), stay as they are.
 void complete_unobserved_cameras(const camera::Rig& given, RigAdjustment& adjusted);
 
 }  // namespace bslam::calibration

@@ -103,7 +103,7 @@ Rig Rig::subset(std::span<const int> indices) const {
   for (const CameraMove& move : moves()) {
     const auto found = std::ranges::find(indices, static_cast<int>(move.camera));
     if (found != indices.end())
-      chosen_moves.push_back({static_cast<std::size_t>(found - indices.begin()), move.time_ns, move.T_after_before});
+      chosen_moves.push_back({static_cast<std::size_t>(found - indices.begin()), move.time_ns, move.T_after_initial});
   }
   return Rig(std::move(chosen), indices.front() == 0 ? cam_from_rig(0) : SE3()).with_moves(std::move(chosen_moves));
 }
@@ -125,7 +125,7 @@ const CameraMove* Rig::move_at(std::size_t i, TimeNs time_ns) const {
 
 SE3 Rig::cam_from_rig_at(std::size_t i, TimeNs time_ns) const {
   const CameraMove* move = move_at(i, time_ns);
-  return move == nullptr ? cam_from_rig(i) : move->T_after_before * cam_from_rig(i);
+  return move == nullptr ? cam_from_rig(i) : move->T_after_initial * cam_from_rig(i);
 }
 
 Rig Rig::at(TimeNs time_ns) const {
@@ -162,7 +162,7 @@ Rig Rig::with_calibration_of(const Rig& part, std::span<const int> indices) cons
     if (std::ranges::find(indices, static_cast<int>(move.camera)) == indices.end()) all_moves.push_back(move);
   }
   for (const CameraMove& move : part.moves())
-    all_moves.push_back({static_cast<std::size_t>(indices[move.camera]), move.time_ns, move.T_after_before});
+    all_moves.push_back({static_cast<std::size_t>(indices[move.camera]), move.time_ns, move.T_after_initial});
   const bool same_first = !indices.empty() && indices.front() == 0;
   return Rig(std::move(cameras), same_first ? part.cam_from_rig(0) : cam_from_rig(0)).with_moves(std::move(all_moves));
 }
@@ -183,7 +183,7 @@ bool Rig::same_calibration(const Rig& other) const {
     if (body_from_cam(i).matrix() != other.body_from_cam(i).matrix()) return false;
   }
   return std::ranges::equal(moves(), other.moves(), [](const CameraMove& a, const CameraMove& b) {
-    return a.camera == b.camera && a.time_ns == b.time_ns && a.T_after_before.matrix() == b.T_after_before.matrix();
+    return a.camera == b.camera && a.time_ns == b.time_ns && a.T_after_initial.matrix() == b.T_after_initial.matrix();
   });
 }
 

@@ -1,6 +1,7 @@
-// The rig: N cameras and their constant extrinsics. The rig frame is the frame of camera 0 (the paper's camera 1) as it
-// was calibrated, so T_cam_rig of camera 0 is the identity, except for the rotation of a refined calibration (see the
-// constructor). The paper's T_i1 is T_cam_rig of camera i, and c_i = T_i1 c_1 is cam_from_rig(i) * T_rig_world.
+// The rig: N cameras and their extrinsics, which are constant unless cameras were moved. The rig frame is the frame of
+// camera 0 (the paper's camera 1) as it was calibrated, so T_cam_rig of camera 0 is the identity, except for the
+// rotation of a refined calibration (see the constructor). The paper's T_i1 is T_cam_rig of camera i, and c_i = T_i1
+// c_1 is cam_from_rig(i) * T_rig_world.
 #pragma once
 
 #include <memory>
@@ -22,12 +23,12 @@ struct RigCamera {
 };
 
 // A camera that was moved relative to the rig during a recording, because it was hit or its mount slipped. From a time
-// on, T_cam_rig is T_after_before T_cam_rig, up to its next move. T_after_before refers to the extrinsics at the
+// on, T_cam_rig is T_after_initial T_cam_rig, up to its next move. T_after_initial refers to the extrinsics at the
 // beginning of the recording, also if there is an earlier move.
 struct CameraMove {
   std::size_t camera = 0;
   TimeNs time_ns = 0;
-  geometry::SE3 T_after_before;
+  geometry::SE3 T_after_initial;
 };
 
 // Immutable; copies share the calibration.
@@ -42,7 +43,7 @@ class Rig {
   const Camera& camera(CameraIndex i) const { return calibration_->cameras[i.index()].camera; }
   const Camera& camera(std::size_t i) const { return calibration_->cameras[i].camera; }
 
-  // T_cam_rig: maps coordinates in the rig frame (camera 0) to the frame of camera i. Constant, as in the paper.
+  // T_cam_rig: maps coordinates in the rig frame (camera 0) to the frame of camera i.
   const geometry::SE3& cam_from_rig(std::size_t i) const { return T_cam_rig_[i]; }
   const geometry::SE3& cam_from_rig(CameraIndex i) const { return T_cam_rig_[i.index()]; }
   const geometry::SE3& rig_from_cam(std::size_t i) const { return T_rig_cam_[i]; }

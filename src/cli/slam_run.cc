@@ -98,9 +98,12 @@ Result<std::optional<storage::SavedMap>> read_map(const SlamArguments& arguments
   if (const Status status = system::check_settings(config, map, rig); !status) return status.error();
   if (log_verbosity(arguments.log_level) >= LogVerbosity::kWarning) print_other_names(file, map, rig);
   if (system::shared_with_other_rigs(map, rig) && log_verbosity(arguments.log_level) >= LogVerbosity::kWarning) {
-    const char* const text = map::find_rig(map, rig)
-                                 ? "has further cameras; the calibration is that of the map and is not estimated"
-                                 : "was made with another rig or calibration; that of this run is kept as given";
+    const auto found = map::find_rig(map, rig);
+    const bool moved = found && !map::cameras_of(map.rig(), *found, rig.size()).moves().empty();
+    const char* const text =
+        moved   ? "was made while a camera was moved; the calibration is that of the map after it and is not estimated"
+        : found ? "has further cameras; the calibration is that of the map and is not estimated"
+                : "was made with another rig or calibration; that of this run is kept as given";
     print_message("note: {} {}\n", file, text);
   }
   return std::optional(*std::move(saved));
@@ -182,7 +185,7 @@ void print_after(const session::RunRecord& record, const std::vector<std::string
   if (verbosity >= LogVerbosity::kInfo) print_stage_statistics(record);
   if (verbosity >= LogVerbosity::kWarning) print_warnings(warnings);
   print_result(record, arguments.out);
-  if (arguments.memory_report) fmt::print("\n{}", session::memory_text(record));
+  if (!record.memory.parts.empty()) fmt::print("\n{}", session::memory_text(record));
 }
 
 // The options of the session that do not depend on the source of its frames.
@@ -294,7 +297,7 @@ int run_and_write(const SlamArguments& arguments, RunInput input, session::RunCo
   }
   if (arguments.image_stamps) result->subtracted_ns = dataset.rig.camera(0).time_offset_ns;
   const std::vector<std::string> warnings = note_warnings(input, of_map, of_source, result->record);
-  if (arguments.memory_report) note_report_size(*result, input.config, dataset, arguments);
+  if (!result->record.memory.parts.empty()) note_report_size(*result, input.config, dataset, arguments);
   const storage::MapFileInfo info = map_info(result->record, **vocabulary, map_warning);
   const std::vector<Error> unwritten = write_files(*result, input.config, dataset, arguments, info, *earlier);
   const Status sent =

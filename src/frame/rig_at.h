@@ -1,4 +1,4 @@
-// The rig at the time of a frame, without its motion during the capture (frame::rig_of).
+// The rig with the extrinsics at the time of a frame; frame::rig_of adds the motion during the capture.
 #pragma once
 
 #include <optional>

@@ -69,7 +69,7 @@ std::vector<camera::RigCamera> moved_into(const camera::Rig& whole, const camera
 // Adds the moves of cameras of a rig, whose camera 0 is camera `first` of another one.
 void add_moves(const camera::Rig& rig, std::size_t first, std::vector<camera::CameraMove>& moves) {
   for (const camera::CameraMove& move : rig.moves())
-    moves.push_back({first + move.camera, move.time_ns, move.T_after_before});
+    moves.push_back({first + move.camera, move.time_ns, move.T_after_initial});
 }
 
 // Appends a rig with its calibration as it was given and as it is, and returns the index of its first camera.
@@ -152,6 +152,13 @@ Cameras same_cameras(const PartOfMap& part, const camera::Rig& rig) {
   return {};
 }
 
+// Whether the cameras from `first` on are those of `rig` after moves of them.
+bool contains_after_moves(const BundledMap& map, std::size_t first, const camera::Rig& rig) {
+  if (map.rig().moves().empty()) return false;
+  const camera::Rig of_map = cameras_of(map.rig(), first, rig.size());
+  return contains(of_map.after_moves(), cameras_of(map.given_rig(), first, rig.size()), 0, rig);
+}
+
 }  // namespace
 
 void BundledMap::append_cameras(std::shared_ptr<const camera::Rig> rig, std::shared_ptr<const camera::Rig> given) {
@@ -171,7 +178,8 @@ std::optional<std::size_t> find_rig(const BundledMap& map, const camera::Rig& ri
   for (std::size_t first = 0; first + rig.size() <= map.rig().size(); ++first) {
     if (!same_pose(map.given_rig().cam_from_rig(first), geometry::SE3())) continue;  // within another rig
     const camera::Rig& given = map.given_rig();
-    if (!contains(given, given, first, rig) && !contains(map.rig(), given, first, rig)) continue;
+    const bool at_begin = contains(given, given, first, rig) || contains(map.rig(), given, first, rig);
+    if (!at_begin && !contains_after_moves(map, first, rig)) continue;
     if (cameras_of(map.rig(), first, rig.size()).moves().empty()) return first;
     if (!moved) moved = first;
   }
@@ -192,8 +200,10 @@ std::vector<CameraIndex> find_or_append_rigs(BundledMap& map, const BundledMap& 
     const camera::Rig given = cameras_of(other.given_rig(), out.size(), size);
     const camera::Rig rig = cameras_of(other.rig(), out.size(), size);
     auto found = find_rig(map, given);
-    // The moves of a recording do not apply to another one.
+    // The moves of a recording do not apply to another one. If there are any, the same extrinsics are needed.
     if (!rig.moves().empty() || (found && !cameras_of(map.rig(), *found, size).moves().empty())) found.reset();
+    const bool any_moves = !map.rig().moves().empty() || !other.rig().moves().empty();
+    if (found && any_moves && !contains(map.rig(), map.given_rig(), *found, rig)) found.reset();
     const std::size_t first = found ? *found : append_rig(map, given, rig);
     for (std::size_t i = 0; i < size; ++i) out.emplace_back(first + i);
   }
@@ -240,7 +250,7 @@ camera::Rig cameras_of(const camera::Rig& whole, std::size_t first, std::size_t 
   std::vector<camera::CameraMove> moves;
   for (const camera::CameraMove& move : whole.moves()) {
     if (move.camera >= first && move.camera < first + size)
-      moves.push_back({move.camera - first, move.time_ns, move.T_after_before});
+      moves.push_back({move.camera - first, move.time_ns, move.T_after_initial});
   }
   return camera::Rig(std::move(out), whole.cam_from_rig(first)).with_moves(std::move(moves));
 }

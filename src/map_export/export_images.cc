@@ -66,9 +66,11 @@ std::vector<std::string> nerfstudio_paths(const Exporter& exporter) {
   return paths;
 }
 
-// The masks themselves are not exported.
-std::string rig_without_masks(const camera::Rig& rig) {
-  return rig_formats::rig_to_yaml(rig_formats::without(rig, rig_formats::Droppable::kMasks));
+// Writes rig.yaml. The masks themselves are not exported, nor are moves of cameras.
+Status write_rig(Exporter& exporter, const camera::Rig& rig, const AtomicFolder& folder) {
+  if (!exporter.map().rig().moves().empty())
+    exporter.note("a camera was moved during the recording; rig.yaml has its extrinsics before that");
+  return folder.write("rig.yaml", rig_formats::rig_to_yaml(rig_formats::without(rig, rig_formats::Droppable::kMasks)));
 }
 
 // The undistorted image as the bytes of a PNG file; nullopt if the recorded one cannot be read.
@@ -112,7 +114,7 @@ Status write_undistorted(Exporter& exporter, const AtomicFolder& folder) {
   std::vector<camera::RigCamera> cameras;
   for (std::size_t c = 0; c < exporter.map().rig().size(); ++c)
     cameras.push_back({exporter.cameras.camera(c), exporter.map().rig().body_from_cam(c)});
-  return folder.write("rig.yaml", rig_without_masks(camera::Rig(std::move(cameras))));
+  return write_rig(exporter, camera::Rig(std::move(cameras), exporter.map().rig().cam_from_rig(0)), folder);
 }
 
 Status export_colmap(Exporter& exporter) {
@@ -157,7 +159,7 @@ Status export_folder(Exporter& exporter) {
   auto folder = folder_of(exporter);
   if (!folder) return folder.error();
   if (Status s = folder->write("points.ply", landmarks_ply(exporter.selection, colours)); !s) return s;
-  if (Status s = folder->write("rig.yaml", rig_without_masks(exporter.map().rig())); !s) return s;
+  if (Status s = write_rig(exporter, exporter.map().rig(), *folder); !s) return s;
   if (Status s = write_keyframes(exporter, *folder); !s) return s;
   const auto model = colmap_model(exporter.selection, exporter.images, exporter.cameras, colours);
   if (model) {

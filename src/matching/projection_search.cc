@@ -13,6 +13,7 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr int kNone = 1 << 20;
+constexpr double kMinRadius_px = 1;  // in coarse images, a smaller one would be less than the noise of keypoints
 
 struct Candidate {
   int best = kNone, second = kNone;
@@ -101,7 +102,7 @@ ProjectionSearchResult search_by_projection(const camera::Rig& rig, CameraIndex 
   ProjectionSearchResult result;
   const feature::Keypoints& keypoints = frame.keypoints;
   const double log_factor = std::log(options.scale_factor);
-  const double radius_px = options.radius / camera.radians_per_pixel();
+  const double radius_px = std::max(options.radius / camera.radians_per_pixel(), kMinRadius_px);
   const View view(rig, c, T_cam_common, options.max_view_angle);
   std::vector<std::uint32_t> near;
   std::vector<std::pair<int, std::uint32_t>> owner(keypoints.size(), {kNone, 0});  // (hamming, position in matches)

@@ -97,6 +97,7 @@ void add_calibration(const RecordInput& input, RunRecord& record) {
   CalibrationRecord& calibration = record.calibration;
   calibration.estimate = input.system.calibration();
   calibration.excess_bound = input.config.calibration.inconsistent_excess;
+  calibration.moves_in_map = !input.system.rig().moves().empty();
   for (const calibration::MoveEstimate& m : calibration.estimate.moves)
     calibration.moves.push_back({m.camera, seconds(input, m.time_ns), m.change_deg, m.std_deg, m.change_mm, m.std_mm});
   const map::MapSnapshot map = input.system.snapshot();

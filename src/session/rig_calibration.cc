@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "base/assert.h"
 #include "calibration/calibration_prior.h"
@@ -44,7 +45,9 @@ double scale_deviation(const camera::Rig& rig, const calibration::CalibrationOpt
 
 // The estimate from one recording, and the runs it took.
 struct Passes {
+  std::string recording;
   calibration::RigRefinement refinement;
+  std::vector<CameraMoveRecord> moves;
   int runs = 0;
   bool converged = false;
 };
@@ -56,6 +59,7 @@ Result<Passes> run_passes(const dataset::Dataset& recording, const RigCalibratio
   options.vocabulary = request.vocabulary;
   options.progress = request.progress;
   Passes out;
+  out.recording = recording.name;
   while (out.runs < kMaxRuns && !out.converged) {
     options.initial_rig = rig;
     auto run = run_session(recording, options);
@@ -68,8 +72,23 @@ Result<Passes> run_passes(const dataset::Dataset& recording, const RigCalibratio
     out.converged = out.runs > 0 && agree(out.refinement.information, run->calibration.information);
     ++out.runs;
     out.refinement = std::move(run->calibration);
-    rig = *out.refinement.rig;
+    out.moves = std::move(run->record.calibration.moves);
+    rig = out.refinement.rig->with_moves({});  // each run finds them at their time
   }
+  return out;
+}
+
+// Leaves out recordings in which a camera was moved, but one if no other remains. Returns the moves.
+std::vector<MoveInRecording> leave_out_moves(std::vector<Passes>& all) {
+  const auto still = [](const Passes& passes) { return passes.moves.empty(); };
+  const bool only_moved = std::ranges::none_of(all, still);
+  std::vector<MoveInRecording> out;
+  for (const Passes& passes : all) {
+    const bool left_out = !only_moved || &passes != &all.front();
+    for (const CameraMoveRecord& move : passes.moves) out.push_back({passes.recording, move, left_out});
+  }
+  if (only_moved) all.erase(all.begin() + 1, all.end());
+  std::erase_if(all, [&](const Passes& passes) { return !only_moved && !still(passes); });
   return out;
 }
 
@@ -113,7 +132,7 @@ Result<RigCalibration> calibrate_rig(std::span<const dataset::Dataset> recording
   const camera::Rig& start = recordings.front().rig;
   if (start.size() < 2)
     return Error{recordings.front().name, "", "a single camera", "at least two cameras with a rough calibration"};
-  std::vector<calibration::RigRefinement> refinements;
+  std::vector<Passes> all;
   camera::Rig rig = start;
   int runs = 0;
   bool converged = true;
@@ -122,16 +141,19 @@ Result<RigCalibration> calibrate_rig(std::span<const dataset::Dataset> recording
     if (!passes) return passes.error();
     runs += passes->runs;
     converged = converged && passes->converged;
-    rig = *passes->refinement.rig;
-    refinements.push_back(std::move(passes->refinement));
+    rig = passes->refinement.rig->after_moves();
+    all.push_back(*std::move(passes));
   }
+  std::vector<MoveInRecording> moves = leave_out_moves(all);
+  std::vector<calibration::RigRefinement> refinements;
+  for (Passes& passes : all) refinements.push_back(std::move(passes.refinement));
   auto joint = calibration::combine(start, refinements);
   if (!joint) return Error{recordings.front().name, "", "an estimate without deviations", "more landmarks"};
   const dataset::Dataset& first = recordings.front();
   camera::Rig whole =
       first.whole_rig ? first.whole_rig->with_calibration_of(joint->rig, first.cameras_used) : joint->rig;
-  return RigCalibration{
-      start, *std::move(joint), runs, converged, scale_deviation(start, request.config.calibration), std::move(whole)};
+  const double scale_std = scale_deviation(start, request.config.calibration);
+  return RigCalibration{start, *std::move(joint), runs, converged, scale_std, std::move(whole), std::move(moves)};
 }
 
 }  // namespace bslam::session

@@ -9,6 +9,7 @@
 #include "calibration/joint_refinement.h"
 #include "dataset/dataset.h"
 #include "place/vocabulary.h"
+#include "session/run_record.h"
 #include "system/config.h"
 
 namespace bslam::session {
@@ -20,6 +21,14 @@ struct RigCalibrationRequest {
   std::function<void(std::size_t done, std::size_t all)> progress;  // frames of the present run; may be empty
 };
 
+// A camera that was moved during a recording. The calibration is that before it; if there are other recordings without
+// moves, this one does not count, since it is not known which of its parts they belong to.
+struct MoveInRecording {
+  std::string recording;
+  CameraMoveRecord move;
+  bool left_out = false;
+};
+
 struct RigCalibration {
   camera::Rig start;  // the given calibration of the cameras in use
   calibration::JointRefinement joint;
@@ -29,6 +38,7 @@ struct RigCalibration {
   // for a single camera.
   double scale_std = 0;
   camera::Rig whole;  // `joint.rig` together with the cameras of the calibration that were not used
+  std::vector<MoveInRecording> moves = {};
 };
 
 // The configuration of a calibration: sequential, always refined, and with the deviations of a rough start.

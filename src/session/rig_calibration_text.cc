@@ -121,6 +121,17 @@ std::string missing_text(const RigCalibration& c) {
   return out;
 }
 
+std::string moves_text(const RigCalibration& c) {
+  std::string out;
+  for (const auto& [recording, move, left_out] : c.moves)
+    out += fmt::format("{}: moved relative to the others at about {:.1f} s of {}, by {:.2f} deg and {:.1f} mm; {}\n",
+                       c.start.camera(move.camera).name, move.at_s, recording, move.change_deg, move.change_mm,
+                       left_out ? "this recording is left out, since the others may show the rig before or after it"
+                                : "the result is the rig before it: for the present one, use recordings that were "
+                                  "made after it");
+  return out;
+}
+
 }  // namespace
 
 std::string calibration_text(const RigCalibration& c) {
@@ -132,7 +143,7 @@ std::string calibration_text(const RigCalibration& c) {
     if (i == 0) continue;
     for (const Row& row : extrinsics_rows(c, i)) out += text_of(row);
   }
-  return out + missing_text(c);
+  return out + missing_text(c) + moves_text(c);
 }
 
 std::string calibrated_rig_yaml(const RigCalibration& c) {

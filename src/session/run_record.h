@@ -86,8 +86,9 @@ struct CalibrationRecord {
   // fit wrong matches, or images that were taken at different times.
   bool applies = false;
   std::vector<CameraMoveRecord> moves = {};
-  bool refined = false;     // the final map uses an estimated rig that applies, which is written to rig_refined.yaml
-  double excess_bound = 0;  // the images contradict the calibration if estimate.excess_error is larger
+  bool moves_in_map = false;  // the map has extrinsics before and after the moves
+  bool refined = false;       // the final map uses an estimated rig that applies, which is written to rig_refined.yaml
+  double excess_bound = 0;    // the images contradict the calibration if estimate.excess_error is larger
   std::vector<calibration::CameraPair> pairs =
       {};  // pairs of cameras that are contradicted or hardly matched; without keyframes if no map was started
   int pairs_as_given =

@@ -222,10 +222,10 @@ system::Config config_for(const SessionOptions& options) {
   return config;
 }
 
-// The memory of the parts of a run at its end.
+// The memory of the parts of a run at its end. After an interruption, stages may still be running.
 void measure_memory(const SessionOptions& options, const system::System& system, const Fed& fed,
                     SessionResult& result) {
-  if (!options.memory_report) return;
+  if (!options.memory_report || options.interrupted.stop_requested()) return;
   result.record.memory = memory_report({.system = system,
                                         .vocabulary = options.vocabulary.get(),
                                         .record = result.record,

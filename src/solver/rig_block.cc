@@ -22,6 +22,10 @@ Matrix6d change_jacobian(const Vector6d& change) {
   return J;
 }
 
+std::size_t num_with_baseline(const ExtrinsicPrior& prior) {
+  return prior.with_baseline > 0 ? prior.with_baseline : prior.T_cam_rig.size();
+}
+
 // Adds the columns of the next camera, which has `size` unknowns, to those of the cameras before it.
 void add_columns(const SharedUnknowns& shared, int size, std::vector<RigBlock::Range>& columns, int& total) {
   const std::size_t c = columns.size();
@@ -81,13 +85,19 @@ double baseline_scale(std::span<const SE3> T_cam_rig, std::span<const SE3> calib
   return reference > 0 ? std::sqrt(sum / reference) : 1.0;
 }
 
+double baseline_scale(std::span<const SE3> T_cam_rig, const ExtrinsicPrior& prior) {
+  const std::size_t n = num_with_baseline(prior);
+  return baseline_scale(T_cam_rig.first(n), std::span(prior.T_cam_rig).first(n), prior.displaced);
+}
+
 std::vector<std::uint8_t> displaced_cameras(std::span<const SE3> T_cam_rig, const ExtrinsicPrior& prior) {
   constexpr std::size_t kMinBaselines = 3;
   constexpr double kDeviations = 4.0;
   const std::vector<SE3>& calibrated = prior.T_cam_rig;
   std::vector<std::uint8_t> out(calibrated.size(), 0);
   std::vector<double> ratios;
-  for (std::size_t c = 1; c < calibrated.size(); ++c) {
+  const std::size_t n = num_with_baseline(prior);
+  for (std::size_t c = 1; c < n; ++c) {
     const double length = calibrated[c].translation().norm();
     if (length > kDeviations * prior.sigma_translation) ratios.push_back(T_cam_rig[c].translation().norm() / length);
   }
@@ -98,7 +108,8 @@ std::vector<std::uint8_t> displaced_cameras(std::span<const SE3> T_cam_rig, cons
     const Eigen::Matrix3d covariance = covariance_of(prior, c).bottomRightCorner<3, 3>();
     out[c] = change.dot(covariance.inverse() * change) > kDeviations * kDeviations;
   }
-  if (2 * std::ranges::count(out, std::uint8_t{1}) >= std::ssize(out)) std::ranges::fill(out, std::uint8_t{0});
+  if (2 * std::ranges::count(std::span(out).first(n), std::uint8_t{1}) >= static_cast<std::ptrdiff_t>(n))
+    std::ranges::fill(out, std::uint8_t{0});
   return out;
 }
 
@@ -111,7 +122,7 @@ ExtrinsicsBlock::ExtrinsicsBlock(ExtrinsicPrior prior) : prior_(std::move(prior)
   double sum = 0.0;
   for (std::size_t c = 0; c < prior_.T_cam_rig.size(); ++c) {
     const bool displaced = !prior_.displaced.empty() && prior_.displaced[c];
-    if (!displaced) sum += prior_.T_cam_rig[c].translation().squaredNorm();
+    if (!displaced && c < num_with_baseline(prior_)) sum += prior_.T_cam_rig[c].translation().squaredNorm();
     information_.push_back(covariance_of(prior_, c).inverse());
   }
   if (prior_.sigma_scale > 0 && sum > 0) scale_gradient_ = 1.0 / (prior_.sigma_scale * sum);
@@ -119,7 +130,7 @@ ExtrinsicsBlock::ExtrinsicsBlock(ExtrinsicPrior prior) : prior_(std::move(prior)
 
 double ExtrinsicsBlock::scale_error(const RigValues& values) const {
   if (scale_gradient_ == 0) return 0.0;
-  return (baseline_scale(values.T_cam_rig, prior_.T_cam_rig, prior_.displaced) - 1.0) / prior_.sigma_scale;
+  return (baseline_scale(values.T_cam_rig, prior_) - 1.0) / prior_.sigma_scale;
 }
 
 void ExtrinsicsBlock::evaluate(const RigObservation& observation, Eigen::Ref<Jacobian> J) const {
@@ -154,9 +165,9 @@ void ExtrinsicsBlock::add_prior(const RigValues& values, Eigen::Ref<Eigen::Matri
     b.segment<6>(at) -= JtI * change;
   }
   // The distance |t| of a camera changes by t . v / |t| for the left perturbation (w, v) of T_cam_rig = [R, t].
-  const double gradient = scale_gradient_ / baseline_scale(values.T_cam_rig, prior_.T_cam_rig, prior_.displaced);
+  const double gradient = scale_gradient_ / baseline_scale(values.T_cam_rig, prior_);
   Eigen::VectorXd scale_jacobian = Eigen::VectorXd::Zero(size());
-  for (std::size_t c = 1; c < values.T_cam_rig.size(); ++c) {
+  for (std::size_t c = 1; c < num_with_baseline(prior_); ++c) {
     if (!prior_.displaced.empty() && prior_.displaced[c]) continue;
     scale_jacobian.segment<3>(6 * (static_cast<Eigen::Index>(c) - 1) + 3) =
         gradient * values.T_cam_rig[c].translation();
@@ -225,10 +236,8 @@ void IntrinsicsBlock::add_prior(const RigValues& values, Eigen::Ref<Eigen::Matri
   }
 }
 
-TimingBlock::TimingBlock(std::vector<TimingPrior> prior, SharedUnknowns shared)
-    : prior_(std::move(prior)), shared_(std::move(shared)) {
-  for (const TimingPrior& p : prior_)
-    add_columns(shared_, (p.sigma_shift > 0) + (p.sigma_readout > 0), columns_, size_);
+TimingBlock::TimingBlock(std::vector<TimingPrior> prior, const SharedUnknowns& shared) : prior_(std::move(prior)) {
+  for (const TimingPrior& p : prior_) add_columns(shared, (p.sigma_shift > 0) + (p.sigma_readout > 0), columns_, size_);
 }
 
 void TimingBlock::evaluate(const RigObservation& observation, Eigen::Ref<Jacobian> J) const {

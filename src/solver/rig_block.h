@@ -68,6 +68,9 @@ struct ExtrinsicPrior {
   // length looks like a displacement along the axis.
   double sigma_depth = 0;
   double sigma_scale = 0;  // relative standard deviation of the scale; 0: no separate prior
+  // The number of cameras, the first ones, whose baselines count for the scale; 0: all. The others are cameras after a
+  // move, whose distance may have changed.
+  std::size_t with_baseline = 0;
   // Per camera: its position is far from the calibrated one. Its translation gets ten times the deviation, and its
   // baseline does not count for the scale. Empty: none.
   std::vector<std::uint8_t> displaced = {};
@@ -80,6 +83,9 @@ geometry::Matrix6d covariance_of(const ExtrinsicPrior& prior, std::size_t camera
 // `displaced`. 1 if these have the same centre in the calibration.
 double baseline_scale(std::span<const SE3> T_cam_rig, std::span<const SE3> calibrated,
                       std::span<const std::uint8_t> displaced = {});
+
+// The same of the cameras that count in a prior.
+double baseline_scale(std::span<const SE3> T_cam_rig, const ExtrinsicPrior& prior);
 
 // Flags the cameras whose centres are farther than four standard deviations from the calibrated ones, at the scale that
 // half of the baselines do not exceed: with a mean, one camera that was displaced would spoil the scale of all. At
@@ -111,8 +117,8 @@ class ExtrinsicsBlock : public RigBlock {
   double scale_gradient_ = 0;                    // 1 / (sigma_scale sum |c'|^2); 0 without a prior of the scale
 };
 
-// Per camera: the camera, before it or itself, whose unknowns it has, because it is the same camera at another place.
-// Empty: every camera has its own.
+// Per camera: the index of the camera whose unknowns it uses, which is its own or, for a camera after a move, the
+// smaller one of the camera that it is. Empty: every camera has its own.
 using SharedUnknowns = std::vector<std::size_t>;
 inline bool has_own_unknowns(const SharedUnknowns& shared, std::size_t camera) {
   return shared.empty() || shared[camera] == camera;
@@ -162,7 +168,7 @@ struct TimingPrior {
 // shift of camera 0 should be constant, because a common shift of all cameras changes nothing but the poses.
 class TimingBlock : public RigBlock {
  public:
-  explicit TimingBlock(std::vector<TimingPrior> prior, SharedUnknowns shared = {});
+  explicit TimingBlock(std::vector<TimingPrior> prior, const SharedUnknowns& shared = {});
 
   int size() const override { return size_; }
   Range columns(int camera) const override { return columns_[static_cast<std::size_t>(camera)]; }
@@ -176,7 +182,6 @@ class TimingBlock : public RigBlock {
 
  private:
   std::vector<TimingPrior> prior_;
-  SharedUnknowns shared_;
   std::vector<Range> columns_;  // per camera
   int size_ = 0;
 };

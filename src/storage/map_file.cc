@@ -253,13 +253,15 @@ bool has_distances(const camera::Rig& rig) {
 Status check_continued(const SavedMap& saved, const camera::Rig& rig, const feature::PyramidShape& pyramid,
                        const place::Vocabulary* vocabulary) {
   if (const Status status = fits(saved, pyramid, vocabulary); !status) return status;
-  const bool known = map::find_rig(saved.map, rig).has_value();
+  const auto found = map::find_rig(saved.map, rig);
+  const bool known = found.has_value();
   const map::Scale scale = saved.map.scale();  // a single camera has made the map if it is only up to scale
   if ((scale == map::Scale::kUpToScale || (scale == map::Scale::kUnobservable && !known)) && has_distances(rig)) {
     return Error{saved.file, "scale", "a map whose lengths are not in metres",
                  "a single camera, or a metric map, since the distances between the cameras of this rig are in metres"};
   }
-  const std::size_t cameras = saved.map.rig().size() + (known ? 0 : rig.size());
+  const bool appended = !known || !map::cameras_of(saved.map.rig(), *found, rig.size()).moves().empty();
+  const std::size_t cameras = saved.map.rig().size() + (appended ? rig.size() : 0);
   if (cameras > kMaxCameras) {
     return Error{saved.file, "rig", fmt::format("{} cameras with those of this run", cameras),
                  fmt::format("at most {}; a map with fewer rigs", kMaxCameras)};

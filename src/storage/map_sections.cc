@@ -138,7 +138,7 @@ void put_cameras(const camera::Rig& rig, ByteWriter& out) {
   for (const camera::CameraMove& move : rig.moves()) {
     out.number(static_cast<std::uint32_t>(move.camera));
     out.number(move.time_ns);
-    put_transform(move.T_after_before, out);
+    put_transform(move.T_after_initial, out);
   }
 }
 
@@ -148,7 +148,7 @@ std::vector<camera::CameraMove> take_moves(SectionReader& in, std::size_t camera
   for (camera::CameraMove& move : moves) {
     move.camera = in.number<std::uint32_t>();
     move.time_ns = in.number<TimeNs>();
-    move.T_after_before = take_transform(in);
+    move.T_after_initial = take_transform(in);
     in.require(move.camera < cameras, "a move of camera " + std::to_string(move.camera), "a camera of the rig");
     if (!in.ok()) return {};
   }

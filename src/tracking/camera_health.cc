@@ -13,6 +13,7 @@ namespace bslam::tracking {
 namespace {
 
 constexpr int kMaxMissedFrames = 10;  // frames without an image of a working camera with a lower rate than the others
+constexpr int kMaxRepeated = 4;       // identical images in a row that a slow camera's driver may insert
 constexpr int kSampleStep = 4;        // only every fourth row and column is used to measure brightness
 
 std::uint64_t mixed(std::uint64_t hash, std::uint64_t value) {
@@ -136,6 +137,9 @@ std::vector<CameraReason> CameraMonitor::find_outages(const Health& images) {
     // A frozen camera stays frozen as long as its image is the same, even if no other camera has an image.
     const bool frozen = same[c] && (any_changed || camera.outage == CameraReason::kFrozen);
     if (found[c] == CameraReason::kNone && frozen) found[c] = CameraReason::kFrozen;
+    if (camera.outage == CameraReason::kFrozen && !same[c] && camera.repeated <= kMaxRepeated)
+      camera.outage = CameraReason::kNone;
+    camera.repeated += same[c];
     if (found[c] != CameraReason::kNone) {
       camera.outage = found[c];
       camera.good = 0;
@@ -143,6 +147,7 @@ std::vector<CameraReason> CameraMonitor::find_outages(const Health& images) {
       found[c] = camera.outage;
     } else {
       camera.outage = CameraReason::kNone;
+      camera.repeated = 0;
     }
   }
   admit_if_none_is_left(images, found);
@@ -166,9 +171,8 @@ void CameraMonitor::admit_if_none_is_left(const Health& images, std::vector<Came
 std::vector<std::uint8_t> CameraMonitor::find_blurred(const Health& images) {
   std::vector<std::uint8_t> out(cameras_.size(), 0);
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
-    if (!images[c]) continue;
     Camera& camera = cameras_[c];
-    if (const auto now = images[c]->blurred) {
+    if (const auto now = images[c] ? images[c]->blurred : std::nullopt) {
       camera.sharp = *now ? 0 : camera.sharp + 1;
       camera.blurred = *now || (camera.blurred && camera.sharp < options_.readmit_after);
     }

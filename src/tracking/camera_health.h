@@ -69,7 +69,8 @@ class CameraMonitor {
 
   // Per camera, why it is not used in this frame. An image is frozen if it is identical to the previous image of its
   // camera while the image of another camera has changed; frozen images are thus not detected with a single camera or
-  // if all images are identical. A camera without an image is not used in that frame, and used again with its next
+  // if all images are identical. After a few identical images, as of a driver that repeats the images of a slow camera,
+  // the next one is used at once. A camera without an image is not used in that frame, and used again with its next
   // image. If all other cameras are out as well, a camera with a good image is used immediately. If no image is good,
   // the cameras whose images are only partly over-exposed are used.
   std::vector<CameraReason> find_outages(const Health& images);
@@ -84,6 +85,7 @@ class CameraMonitor {
     std::optional<std::uint64_t> last;          // hash of its last image
     CameraReason outage = CameraReason::kNone;  // reason of its last outage, until it is used again
     int good = 0;                               // consecutive good images since
+    int repeated = 0;                           // images that were identical to the one before, since then
     bool blurred = false;
     int sharp = 0;   // consecutive sharp images
     int missed = 0;  // frames since its last image

@@ -54,14 +54,16 @@ FramePairs match_cameras(const BundledFrame& first, const BundledFrame& second) 
 }
 
 // Returns the camera with the largest median parallax among those with enough inliers.
-std::optional<TwoView> best_two_view(const FramePairs& pairs, const InitialisationOptions& options,
-                                     std::uint64_t seed) {
+std::optional<TwoView> best_two_view(const FramePairs& pairs, const camera::Rig& rig,
+                                     const InitialisationOptions& options, std::uint64_t seed) {
+  constexpr double kNoise_px = 0.5;  // pixels of small images are larger than the usual bound
   std::optional<TwoView> best;
   for (std::size_t c = 0; c < pairs.keypoints.size(); ++c) {
     TwoView view{c, pairs.keypoints[c], {}};
     if (view.pairs.size() < static_cast<std::size_t>(options.min_monocular)) continue;
-    const auto pose =
-        estimators::relative_pose(pairs.bearings[c], {.min_inliers = kMinInliers}, Random(seed, "two views", c));
+    estimators::RelativePoseOptions two_views{.min_inliers = kMinInliers};
+    two_views.inlier_angle = std::max(two_views.inlier_angle, kNoise_px * rig.camera(c).radians_per_pixel());
+    const auto pose = estimators::relative_pose(pairs.bearings[c], two_views, Random(seed, "two views", c));
     if (!pose || pose->num_inliers < options.min_monocular_points) continue;
     view.pose = *pose;
     if (!best || view.pose.median_parallax > best->pose.median_parallax) best = view;
@@ -139,7 +141,7 @@ std::optional<StartedMap> initialise_monocular(const StartCandidate& first, cons
   const frame::RigAt rig_at(draft.map().rig(), frame);
   const camera::Rig& rig = *rig_at;
   const FramePairs pairs = match_cameras(*first.frame, frame);
-  const auto view = best_two_view(pairs, options, random.next());
+  const auto view = best_two_view(pairs, rig, options, random.next());
   if (!view) return std::nullopt;
   const Unit chosen = choose_unit(*view, pairs, rig, options);
   const double unit = chosen.length;

@@ -129,7 +129,8 @@ std::map<KeyframeId, std::vector<std::uint8_t>, std::greater<>> cameras_by_refer
 double share_in_image(const map::BundledMap& map, KeyframeId keyframe, std::size_t camera,
                       const geometry::SE3& T_rig_world) {
   const map::BundledKeyframe& then = map.keyframe(keyframe);
-  const geometry::SE3 T_cam_world = map.rig().cam_from_rig_at(camera, then.frame->time_ns) * T_rig_world;
+  constexpr TimeNs kNow = std::numeric_limits<TimeNs>::max();  // after all moves of cameras so far
+  const geometry::SE3 T_cam_world = map.rig().cam_from_rig_at(camera, kNow) * T_rig_world;
   int landmarks = 0, seen = 0;
   for (std::size_t f = 0; f < then.landmarks.size(); ++f) {
     const auto keypoints = then.frame->bundled.keypoints(FeatureId(f));

@@ -145,7 +145,11 @@ Coarse track_last_frame(const TrackInput& input, const frame::BundledFrame& fram
   const bool tracking = input.state.status == TrackStatus::kTracking;
   const bool predicted = tracking && motion_since_last(input.state, frame.time_ns);
   if (predicted && track_in_narrow_windows(input, landmarks, options, pool, out)) return out;
-  const bool found = track_in_wide_windows(input, landmarks, options, pool, out);
+  bool found = track_in_wide_windows(input, landmarks, options, pool, out);
+  if (predicted && !found) {  // wrong time stamps make the prediction wrong
+    out.T_rig_world = last_pose(input);
+    found = track_in_wide_windows(input, landmarks, options, pool, out);
+  }
   if (tracking && (found || !predicted)) track_in_narrow_windows(input, landmarks, options, pool, out);
   return out;
 }

@@ -93,6 +93,7 @@ struct TrackerState {
   map::AnchoredPose anchored;                 // pose of the last tracked frame
   std::optional<geometry::Vector6d> twist;    // T_rig_world(t + dt) = exp(dt twist) T_rig_world(t); rad/s, m/s
   double twist_interval_s = 0;                // time between the two frames from which the twist was computed
+  bool twist_kept = false;                    // it is that of the frame before, which was too shortly before
   std::vector<LandmarkId> landmarks;          // inliers of the last tracked frame
   std::vector<CameraConsensusState> cameras;  // empty until a frame was tracked
   std::vector<CameraReference> references;    // per camera

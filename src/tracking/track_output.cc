@@ -73,6 +73,20 @@ geometry::Matrix6d covariance_of(const solver::PoseSolution& solution, const map
   return 0.5 * (covariance + covariance.transpose());
 }
 
+// The mean twist since the frame before. Frames that follow each other much faster than cameras record have stamps of
+// their arrival, or are two images of one instant: noise would make the twist arbitrarily large, so that the one before
+// is kept, but not twice in a row, since some cameras are that fast.
+void update_twist(const TrackInput& input, TimeNs time_ns, const geometry::SE3& T_rig_world, TrackerState& state) {
+  constexpr double kFastest_s = 0.005;
+  const double dt = to_seconds(time_ns - input.state.time_ns);
+  state.twist_kept = dt > 0 && dt < kFastest_s && state.twist && !state.twist_kept;
+  if (state.twist_kept) return;
+  state.twist.reset();
+  if (dt <= 0 || dt > kMaxPrediction_s) return;
+  state.twist = (T_rig_world * last_pose(input).inverse()).log() / dt;
+  state.twist_interval_s = dt;
+}
+
 }  // namespace
 
 TrackOutput lost(const TrackerState& state, const frame::BundledFrame& frame, LostReason reason) {
@@ -137,12 +151,7 @@ TrackOutput output_of(const TrackInput& input, TrackedFrame found) {
   result.anchored = state.anchored;
   result.covariance = covariance_of(found.solution, map, result.anchored);
 
-  const double dt = to_seconds(frame.time_ns - input.state.time_ns);
-  state.twist.reset();
-  if (dt > 0 && dt <= kMaxPrediction_s) {
-    state.twist = (result.T_rig_world * last_pose(input).inverse()).log() / dt;
-    state.twist_interval_s = dt;
-  }
+  update_twist(input, frame.time_ns, result.T_rig_world, state);
   state.status = TrackStatus::kTracking;
   state.time_ns = frame.time_ns;
   state.landmarks = landmarks_of(out.matches);

@@ -104,14 +104,16 @@ FramePlan Tracker::plan(const image::ImageBundle& images, const ImageFaults& fau
   FramePlan plan;
   std::vector<std::uint8_t> out(rig_.size());
   for (std::size_t c = 0; c < out.size(); ++c) out[c] = faults.outage[c] != CameraReason::kNone;
-  const bool motion_matters = options_.tracking.use_capture_times && !state.track.twist;
+  const bool recent = to_seconds(images.time_ns - state.track.time_ns) <= kMaxPrediction_s;
+  const bool motion_known = state.track.twist && recent;
+  const bool motion_matters = options_.tracking.use_capture_times && !motion_known;
   plan.skipped = motion_matters ? frame::without_late_cameras(rig_, images, out) : out;
   for (std::size_t c = 0; c < out.size(); ++c) plan.postponed.push_back(plan.skipped[c] && !out[c]);
   std::vector<std::uint8_t> failing = excluded(state.track, rig_.size());
   for (std::size_t c = 0; c < failing.size(); ++c) failing[c] |= faults.failing[c];
   plan.budgets = budgets(state, plan.skipped, failing);
   plan.alignment = alignment(state);
-  if (state.track.twist) plan.twist = *state.track.twist;
+  if (motion_known) plan.twist = *state.track.twist;
   return plan;
 }
 

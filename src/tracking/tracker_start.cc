@@ -9,7 +9,10 @@ namespace {
 using frame::BundledFrame;
 
 constexpr int kMetricAttempts = 5;  // frames in which only metric initialisation is attempted if cameras overlap
-constexpr int kMaxStartAge = 100;   // maximum age in frames of the reference frame of a monocular initialisation
+// Maximum age of the reference frame of a monocular initialisation, if both are exceeded.
+constexpr int kMaxStartAge = 100;  // frames
+constexpr double kMaxStartAge_s = 10;
+constexpr std::size_t kMaxWaiting = 100;  // frames since the reference frame; of the later ones, every tenth is kept
 
 // Number of landmarks of a keyframe observed by each camera.
 std::vector<int> landmarks_by_camera(const map::BundledKeyframe& keyframe) {
@@ -30,6 +33,11 @@ TrackResult not_started(const BundledFrame& frame) {
   for (const frame::CameraFrame& c : frame.cameras)
     result.cameras.push_back({static_cast<int>(c.keypoints.size()), 0, 0});
   return result;
+}
+
+bool too_old(const BundledFrame& reference, const BundledFrame& frame) {
+  return frame.id.value() - reference.id.value() > kMaxStartAge &&
+         to_seconds(frame.time_ns - reference.time_ns) > kMaxStartAge_s;
 }
 
 // Returns true if both frames have keypoints, but no camera has keypoints in both of them.
@@ -53,8 +61,9 @@ void Tracker::start(Input& input, TrackOutcome& outcome) const {
   if (relocaliser_) relocaliser_->describe(input.frame);
   if (std::optional<StartedMap> started = initialise(input, outcome.next, draft)) {
     // The first submap declares for the whole map whether its scale is metric. If it is not, each submap has its own
-    // arbitrary unit of length.
-    if (input.map->num_keyframes() == 0) draft.set_scale(started->scale, started->scale_deviation);
+    // arbitrary unit of length. A metric map remains so only with submaps that are metric.
+    const bool withdrawn = input.map->scale() == map::Scale::kMetric && started->scale != map::Scale::kMetric;
+    if (input.map->num_keyframes() == 0 || withdrawn) draft.set_scale(started->scale, started->scale_deviation);
     outcome.edit = ProposedEdit{ProposedEdit::Kind::kStart, std::move(draft),
                                 std::move(started->keyframes.back().landmarks), input.map->landmark_slots()};
   } else {
@@ -70,8 +79,9 @@ std::optional<StartedMap> Tracker::initialise(const Input& input, const FrontEnd
   if (overlap) {
     if (auto started = initialise_metric(input.frame, input.pyramids, options, draft)) return started;
   }
-  // All submaps have the same scale, so a metric map gets no submap of unknown scale.
-  if (input.map->num_keyframes() > 0 && input.map->scale() == map::Scale::kMetric) return std::nullopt;
+  // The scale is a property of the whole map. Overlapping cameras will start a metric submap sooner or later.
+  const bool metric = input.map->num_keyframes() > 0 && input.map->scale() == map::Scale::kMetric;
+  if (metric && (overlap || rig_.size() == 1)) return std::nullopt;
   const int metric_attempts = overlap ? kMetricAttempts : 0;
   if (!state.start_reference || input.frame.id.value() - state.start_reference->frame->id.value() < metric_attempts)
     return std::nullopt;
@@ -106,8 +116,7 @@ void Tracker::keep_reference_frame(Input& input, FrontEndState& state) const {
     return;  // too few keypoints to compare
   const bool others = state.start_reference && from_other_cameras(*state.start_reference->frame, input.frame);
   state.frames_of_others = others ? state.frames_of_others + 1 : 0;
-  const bool good = state.start_reference &&
-                    input.frame.id.value() - state.start_reference->frame->id.value() <= kMaxStartAge &&
+  const bool good = state.start_reference && !too_old(*state.start_reference->frame, input.frame) &&
                     (others ? state.frames_of_others < static_cast<int>(rig_.size())
                             : comparable(*state.start_reference->frame, input.frame, options));
   const auto kept = std::make_shared<const BundledFrame>(std::move(input.frame));
@@ -117,7 +126,7 @@ void Tracker::keep_reference_frame(Input& input, FrontEndState& state) const {
     state.waiting.clear();
     state.frames_of_others = 0;
   }
-  state.waiting.push_back(kept);
+  if (state.waiting.size() < kMaxWaiting || kept->id.value() % 10 == 0) state.waiting.push_back(kept);
 }
 
 void Tracker::complete_start(const map::CommitReport& report, TrackOutcome& outcome) const {

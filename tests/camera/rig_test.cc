@@ -152,7 +152,7 @@ TEST(Rig, HasTheExtrinsicsOfEveryTime) {
     const Rig then = rig.at(t);
     SE3 before_1, before_0;
     for (const CameraMove& move : rig.moves()) {
-      if (move.time_ns <= t) (move.camera == 1 ? before_1 : before_0) = move.T_after_before;
+      if (move.time_ns <= t) (move.camera == 1 ? before_1 : before_0) = move.T_after_initial;
     }
     EXPECT_LT(difference(then.cam_from_rig(1), before_1 * rig.cam_from_rig(1)), 1e-15) << t;
     EXPECT_LT(difference(then.cam_from_rig(0), before_0), 1e-15) << t;

@@ -183,6 +183,44 @@ TEST(AppendMap, UsesTheRefinedCalibrationOfTheMapThatIsContinued) {
   EXPECT_FALSE(std::ranges::equal(bearings(map, 2), bearings(other, 0)));
 }
 
+// A rig whose second camera turned during the recording of its map.
+BundledMap map_with_move(const std::shared_ptr<const camera::Rig>& rig, std::uint64_t seed) {
+  BundledMap map = pair_map(rig, seed);
+  const geometry::SE3 turn(geometry::so3_exp({0, 0.01, 0}), {0.001, 0, 0});
+  map.set_rig(std::make_shared<const camera::Rig>(rig->with_moves({{1, 100, turn}})));
+  return map;
+}
+
+TEST(AppendMap, ARigThatMovedIsKnownByItsExtrinsicsBeforeAndAfter) {
+  const auto rig = synthetic_rig(2);
+  const BundledMap map = map_with_move(rig, 29);
+  const camera::Rig after = map.rig().after_moves();
+  EXPECT_EQ(find_rig(map, *rig), 0u);
+  EXPECT_EQ(find_rig(map, after), 0u);
+  for (const camera::Rig& given : {*rig, after}) {
+    BundledMap continued = map;  // with the rig as it is now
+    ASSERT_EQ(find_or_append_rig(continued, given), 2u);
+    EXPECT_EQ(continued.rig().size(), 4u);
+    EXPECT_LT((continued.rig().cam_from_rig(3).matrix() - after.cam_from_rig(1).matrix()).norm(), 1e-12);
+    ASSERT_EQ(continued.rig().moves().size(), 1u);
+    EXPECT_EQ(continued.rig().moves()[0].camera, 1u);
+    EXPECT_EQ(find_rig(continued, given), 2u);  // no further one for the next run
+  }
+}
+
+// The moves of one recording do not apply to another one.
+TEST(AppendMap, MapsOfARigThatMovedKeepTheirExtrinsics) {
+  const auto rig = synthetic_rig(2);
+  for (const bool moved_first : {false, true}) {
+    BundledMap map = moved_first ? map_with_move(rig, 30) : pair_map(rig, 30);
+    append_map(map, moved_first ? pair_map(rig, 31) : map_with_move(rig, 31));
+    EXPECT_EQ(map.check_invariants().value_or("valid"), "valid");
+    ASSERT_EQ(map.rig().size(), 4u);
+    ASSERT_EQ(map.rig().moves().size(), 1u);
+    EXPECT_EQ(map.rig().moves()[0].camera, moved_first ? 1u : 3u);
+  }
+}
+
 TEST(AttachKeyframes, RejectsACycle) {
   Random random(1);
   BundledMap map{synthetic_rig(1)};

@@ -50,6 +50,28 @@ TEST(RunWarnings, ADistortionThatIsFarOffIsSaid) {
   }
 }
 
+TEST(RunWarnings, AMovedCameraIsNamedWithWhatBecameOfTheMove) {
+  const camera::Rig rig = synthetic::ring_rig(2);
+  for (const auto& [in_map, refined, end] : {std::tuple(false, false, "; the map does not take this into account"),
+                                             std::tuple(true, false, "; the map takes this into account"),
+                                             std::tuple(true, true, ", and rig_refined.yaml is the rig after it")}) {
+    RunRecord record;
+    record.complete = true;
+    record.cameras.resize(2);
+    record.cameras[0].name = "left";
+    record.cameras[1].name = "right";
+    record.calibration.moves_in_map = in_map;
+    record.calibration.refined = refined;
+    record.calibration.moves = {{1, 4.04, 0.31, 0.01, 2.5, 0.6}};
+    const std::vector<std::string> warnings = warnings_after_run(record, rig, "");
+    ASSERT_FALSE(warnings.empty());
+    EXPECT_TRUE(warnings[0].starts_with(
+        "right: moved relative to left at about 4.0 s, by 0.31 deg (std 0.01) and 2.5 mm (std 0.6); the map "))
+        << warnings[0];
+    EXPECT_TRUE(warnings[0].ends_with(end)) << warnings[0];
+  }
+}
+
 TEST(RunWarnings, ACameraThatIsOneFrameLateIsNamedFirst) {
   RunRecord record;
   record.cameras.resize(2);

@@ -218,7 +218,7 @@ TEST(MapFile, KeepsTheMovesOfCameras) {
   ASSERT_EQ(saved.map.rig().moves().size(), 1u);
   EXPECT_EQ(saved.map.rig().moves()[0].camera, 1u);
   EXPECT_EQ(saved.map.rig().moves()[0].time_ns, 500'000'000);
-  expect_same_bits(saved.map.rig().moves()[0].T_after_before, T);
+  expect_same_bits(saved.map.rig().moves()[0].T_after_initial, T);
   // A further recording begins with the rig as it is after the moves.
   const camera::Rig again = synthetic::ring_rig(2);
   EXPECT_EQ(map::find_or_append_rig(map, again), 2u);

@@ -100,6 +100,28 @@ TEST(CameraMonitor, AFrozenCameraStaysFrozenIfTheOthersMissAFrame) {
   EXPECT_EQ(outages(monitor, {good(4), good(2)}), (Outages{CameraReason::kNone, CameraReason::kFrozen}));
 }
 
+// As of a driver that repeats the images of a slow camera.
+TEST(CameraMonitor, ACameraThatRepeatsItsImagesIsUsedWithItsNewOnes) {
+  for (const int times : {2, 5}) {
+    CameraMonitor monitor(2, {});
+    outages(monitor, {good(1), good(1000)});
+    for (int k = 1; k < 30; ++k) {
+      const auto image = static_cast<std::uint64_t>(k / times);
+      const Outages found = outages(monitor, {good(2 + static_cast<std::uint64_t>(k)), good(1000 + image)});
+      EXPECT_EQ(found[1], k % times == 0 ? CameraReason::kNone : CameraReason::kFrozen) << k;
+    }
+  }
+}
+
+// After a longer failure, one good image may be an accident.
+TEST(CameraMonitor, ACameraThatWasFrozenForLongIsReadmittedAfterSeveralImages) {
+  CameraMonitor monitor(2, {.readmit_after = 3});
+  for (std::uint64_t k = 0; k < 7; ++k) outages(monitor, {good(k), good(1000)});
+  for (std::uint64_t k = 7; k < 9; ++k)
+    EXPECT_EQ(outages(monitor, {good(k), good(1000 + k)})[1], CameraReason::kFrozen) << k;
+  EXPECT_EQ(outages(monitor, {good(9), good(1009)})[1], CameraReason::kNone);
+}
+
 TEST(CameraMonitor, AnImageWithOneChangedPixelIsNotFrozen) {
   CameraMonitor monitor(2, {});
   image::Image almost = good(2);
@@ -164,6 +186,12 @@ TEST(CameraMonitor, DistinguishesBlurredImagesFromSharpAndMotionBlurredOnes) {
 TEST(CameraMonitor, DetectsNoBlurInImagesWithoutEdges) {
   CameraMonitor monitor(2, {});
   EXPECT_EQ(examine(monitor, {tiles(4, 4, 15), {}}).blurred, (Flags{0, 0}));
+}
+
+TEST(CameraMonitor, AMissingImageDoesNotMakeACameraSharp) {
+  CameraMonitor monitor(1, {});
+  EXPECT_EQ(examine(monitor, {tiles(4, 4)}).blurred, Flags{1});
+  EXPECT_EQ(examine(monitor, {{}}).blurred, Flags{1});
 }
 
 TEST(CameraMonitor, ACameraIsBlurredUntilSeveralImagesAreSharp) {

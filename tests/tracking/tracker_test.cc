@@ -351,6 +351,46 @@ TEST(Tracker, StartsANewSubmapIfItStaysLost) {
   EXPECT_EQ(started.root, run.store.snapshot()->roots().back());
 }
 
+// Cameras without overlap start a submap without scale, so that the map has none until it is known again.
+TEST(Tracker, AMetricMapOfCamerasWithoutOverlapGetsANewSubmap) {
+  TrackerOptions options;
+  options.new_submap_after = 3;
+  const std::vector<int> apart = {2, 3};
+  const camera::Rig rig = synthetic::default_rig().subset(apart);
+  ASSERT_FALSE(rig.any_overlap());
+  TrackerRun run(simulator(rig, room(1, 0.25), {.radius = 2.2, .period_s = 20}), options);
+  int i = 0;
+  while (i < 60 && run.process(run.frame(i)).result.status != TrackStatus::kTracking) ++i;
+  map::MapDraft draft(run.store.snapshot());
+  draft.set_scale(map::Scale::kMetric);
+  run.store.commit(std::move(draft));
+  run.state.track.anchored = {};
+  for (int end = i + 60; i < end && run.store.snapshot()->roots().size() < 2; ++i) run.process(run.frame(i));
+  EXPECT_EQ(run.store.snapshot()->roots().size(), 2u);
+  EXPECT_EQ(run.store.snapshot()->scale(), map::Scale::kUnobservable);
+}
+
+// Two images of one instant, or stamps of their arrival: noise divided by a millisecond is a large velocity.
+TEST(Tracker, KeepsTheTwistIfAFrameFollowsImmediately) {
+  TrackerRun run(synthetic::ring_rig(2));
+  for (int i = 0; i < 6; ++i) run.process(run.frame(i));
+  const auto shortly_after = [&](int k) {
+    return run.sim.frame(FrameId(5 + k), TrackerRun::time_s(5) + 0.001 * k).frame;
+  };
+  const geometry::Vector6d before = run.state.track.twist.value();
+  ASSERT_EQ(run.process(shortly_after(1)).result.status, TrackStatus::kTracking);
+  EXPECT_EQ(run.state.track.twist.value(), before);
+  ASSERT_EQ(run.process(shortly_after(2)).result.status, TrackStatus::kTracking);  // some cameras are that fast
+  EXPECT_NE(run.state.track.twist.value(), before);
+}
+
+TEST(Tracker, FindsTheRigNearItsLastPoseIfThePredictionIsWrong) {
+  TrackerRun run(synthetic::ring_rig(2));
+  for (int i = 0; i < 6; ++i) run.process(run.frame(i));
+  (*run.state.track.twist)(1) += 12;  // 0.6 rad until the next frame
+  EXPECT_EQ(run.process(run.frame(6)).result.status, TrackStatus::kTracking);
+}
+
 // At many frames per second, the number of frames alone would mean a short disturbance.
 TEST(Tracker, StartsNoNewSubmapInAMomentAtAHighRate) {
   constexpr int kPerSecond = 200, kLost = 20;
