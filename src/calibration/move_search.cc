@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <limits>
 
 #include "calibration/deviation.h"
 
@@ -47,15 +48,27 @@ bool significant(const MoveEstimate& move) {
          (move.translation_sigmas > kMinMoveSigmas && move.change_mm > kMinShift_mm);
 }
 
+// The time of the first keyframe of this run; nullopt if some of a loaded map are later, since their times are then not
+// those of this recording.
+std::optional<TimeNs> begin_of_run(const EstimateInput& input) {
+  TimeNs loaded = std::numeric_limits<TimeNs>::min(), begin = std::numeric_limits<TimeNs>::max();
+  for (const KeyframeId k : input.map.keyframe_ids()) {
+    const TimeNs time_ns = input.map.keyframe(k).frame->time_ns;
+    if (k < input.first) loaded = std::max(loaded, time_ns);
+    if (k >= input.first) begin = std::min(begin, time_ns);
+  }
+  return loaded < begin ? std::optional(begin) : std::nullopt;
+}
+
 // The most likely further move of a camera that is not among the `dropped` ones; nullopt if there is hardly any
-// evidence for one. The recordings of a map may have unrelated times; the moves of one do not concern the others.
+// evidence for one.
 std::optional<PossibleMove> likely_move(const EstimateInput& input, const RigEstimate& estimate,
                                         std::span<const std::size_t> dropped) {
-  const auto time_of = [&](KeyframeId k) { return input.map.keyframe(k).frame->time_ns; };
-  if (!estimate.adjusted.done || !std::ranges::is_sorted(estimate.problem.flat.keyframes, {}, time_of))
-    return std::nullopt;
+  const auto begin = begin_of_run(input);
+  if (!estimate.adjusted.done || !begin) return std::nullopt;
   std::optional<PossibleMove> best;
-  for (const PossibleMove& move : estimate.cameras.likely_moves(estimate.problem, estimate.adjusted.values)) {
+  for (const PossibleMove& move :
+       estimate.cameras.likely_moves(input.map, estimate.problem, estimate.adjusted.values, *begin)) {
     const double turn_deg = geometry::degrees(move.change.head<3>().norm()),
                  shift_mm = kMillimetresPerMetre * move.change.tail<3>().norm();
     const bool small = kHidden * turn_deg < kMinTurn_deg && kHidden * shift_mm < kMinShift_mm;

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <tuple>
 #include <utility>
 
@@ -90,6 +91,18 @@ void sort_observations(RigProblem& problem) {
                            [](const auto& o) { return std::tuple(o.point, o.pose, o.camera); });
 }
 
+TimeNs time_of(const map::BundledMap& map, const RigProblem& problem, std::size_t pose) {
+  return map.keyframe(problem.flat.keyframes[pose]).frame->time_ns;
+}
+
+// The poses of the problem in order of time, which is not always that of their creation.
+std::vector<std::size_t> poses_by_time(const map::BundledMap& map, const RigProblem& problem) {
+  std::vector<std::size_t> out(problem.flat.keyframes.size());
+  std::iota(out.begin(), out.end(), 0);
+  std::ranges::stable_sort(out, {}, [&](std::size_t pose) { return time_of(map, problem, pose); });
+  return out;
+}
+
 }  // namespace
 
 MovedCameras::MovedCameras(std::size_t cameras, std::vector<camera::CameraMove> moves)
@@ -168,9 +181,8 @@ RigInformation MovedCameras::of_rig(const RigInformation& information) const {
 void MovedCameras::separate(const map::BundledMap& map, RigProblem& problem) const {
   if (moves_.empty()) return;
   solver::ReprojectionProblem& flat = problem.flat.problem;
-  const auto time_of = [&](std::size_t pose) { return map.keyframe(problem.flat.keyframes[pose]).frame->time_ns; };
   for (auto& o : flat.observations)
-    o.camera = CameraIndex(camera_at(o.camera.index(), time_of(static_cast<std::size_t>(o.pose))));
+    o.camera = CameraIndex(camera_at(o.camera.index(), time_of(map, problem, static_cast<std::size_t>(o.pose))));
   sort_observations(problem);
   std::vector<SE3> motion;
   for (std::size_t k = 0; k < flat.motion.size(); k += cameras_) {
@@ -199,9 +211,11 @@ void MovedCameras::join(const map::BundledMap& map, const solver::RigValues& val
   sort_observations(problem);
 }
 
-std::vector<PossibleMove> MovedCameras::likely_moves(const RigProblem& problem, const solver::RigValues& values) const {
-  const std::size_t poses = problem.flat.keyframes.size(), cameras = values.T_cam_rig.size();
-  std::vector<Equations> equations(poses * cameras);
+std::vector<PossibleMove> MovedCameras::likely_moves(const map::BundledMap& map, const RigProblem& problem,
+                                                     const solver::RigValues& values, TimeNs from) const {
+  const std::size_t cameras = values.T_cam_rig.size();
+  const std::vector<std::size_t> poses = poses_by_time(map, problem);
+  std::vector<Equations> equations(poses.size() * cameras);
   for (const auto& o : problem.flat.problem.observations)
     add(problem.flat.problem, values, o, equations[static_cast<std::size_t>(o.pose) * cameras + o.camera.index()]);
   std::vector<PossibleMove> out;
@@ -209,8 +223,10 @@ std::vector<PossibleMove> MovedCameras::likely_moves(const RigProblem& problem, 
   for (std::size_t c = cameras_ == 2 ? 1 : 0; c < cameras; ++c) {
     Equations all, after;
     PossibleMove best{.camera = c};
-    for (std::size_t pose = 0; pose < poses; ++pose) all.add_keyframe(equations[pose * cameras + c]);
-    for (std::size_t pose = poses; pose-- > 1;) {
+    for (const std::size_t pose : poses) all.add_keyframe(equations[pose * cameras + c]);
+    for (std::size_t i = poses.size(); i-- > 1;) {
+      const std::size_t pose = poses[i];
+      if (time_of(map, problem, pose) < from) break;
       after.add_keyframe(equations[pose * cameras + c]);
       if (std::min(after.keyframes, all.keyframes - after.keyframes) < kMinKeyframes) continue;
       const auto [change, chi2] = best_change(all, after);
@@ -224,21 +240,22 @@ std::vector<PossibleMove> MovedCameras::likely_moves(const RigProblem& problem, 
 std::vector<camera::CameraMove> MovedCameras::at_best_times(const map::BundledMap& map, const RigProblem& problem,
                                                             const solver::RigValues& values) const {
   std::vector<camera::CameraMove> out = moves_of(values);
-  const std::size_t poses = problem.flat.keyframes.size();
+  const std::vector<std::size_t> poses = poses_by_time(map, problem);
   for (std::size_t m = 0; m < out.size(); ++m) {
     const std::size_t camera_before = before(m), camera_after = cameras_ + m;
-    std::vector<double> benefit(poses, 0);  // decrease of the cost if a pose was before the move, not after it
+    // Decrease of the cost if a pose was before the move, not after it.
+    std::vector<double> benefit(poses.size(), 0);
     for (const Observation& o : problem.flat.problem.observations) {
       if (o.camera.index() != camera_before && o.camera.index() != camera_after) continue;
       benefit[static_cast<std::size_t>(o.pose)] +=
           cost(problem.flat.problem, values, o, camera_after) - cost(problem.flat.problem, values, o, camera_before);
     }
     double sum = 0, most = 0;
-    for (std::size_t pose = 0; pose + 1 < poses; ++pose) {
-      sum += benefit[pose];
+    for (std::size_t i = 0; i + 1 < poses.size(); ++i) {
+      sum += benefit[poses[i]];
       if (sum <= most) continue;
       most = sum;
-      out[m].time_ns = map.keyframe(problem.flat.keyframes[pose + 1]).frame->time_ns;
+      out[m].time_ns = time_of(map, problem, poses[i + 1]);
     }
   }
   std::ranges::stable_sort(out, {}, &camera::CameraMove::time_ns);

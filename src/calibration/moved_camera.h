@@ -50,7 +50,9 @@ class MovedCameras {
   // observations before and after a keyframe. `values`: the optimum for constant extrinsics. There the derivative of
   // the cost with respect to the extrinsics of a camera is zero, but if the camera moved, those of the parts before and
   // after the move have opposite signs (docs/math.md, section 16).
-  std::vector<PossibleMove> likely_moves(const RigProblem& problem, const solver::RigValues& values) const;
+  // Only moves at `from` or later count.
+  std::vector<PossibleMove> likely_moves(const map::BundledMap& map, const RigProblem& problem,
+                                         const solver::RigValues& values, TimeNs from) const;
   // The moves that the values show, each before the keyframe for which its extrinsics before and after it fit best.
   std::vector<camera::CameraMove> at_best_times(const map::BundledMap& map, const RigProblem& problem,
                                                 const solver::RigValues& values) const;

@@ -55,7 +55,8 @@ execution::StageResult calibrate(const Config& config, const camera::Rig& given_
                                  const execution::StageTask& task, const map::MapSnapshot& base,
                                  const std::stop_token& stop) {
   if (left_out(config.calibration, *base, given_rig, first, task.keyframe)) return {};
-  auto refinement = calibration::refine_if_accepted(*base, given_rig, config.calibration, config.feature_model(), stop);
+  auto refinement =
+      calibration::refine_if_accepted(*base, given_rig, config.calibration, config.feature_model(), stop, first);
   if (!refinement) return {};
   calibration::keep_scale(config.calibration, *refinement);
   map::MapDraft draft(base);

@@ -296,7 +296,7 @@ void System::calibrate(map::MapDraft& draft, const std::stop_token& stop) {
   const auto& options = config_.calibration;
   if ((!options.check && options.refine == calibration::Refine::kFalse) || stop.stop_requested()) return;
   const Stopwatch watch;
-  calibration_ = calibration::refine_rig(draft.map(), rig_, options, config_.feature_model(), stop);
+  calibration_ = calibration::refine_rig(draft.map(), rig_, options, config_.feature_model(), stop, first_keyframe_);
   if (calibration::accepted(calibration_, options)) {
     calibration::apply(calibration_, draft);
     final_adjustment_ = mapping::adjust_globally(config_.mapping, config_.feature_model(), draft, stop);
