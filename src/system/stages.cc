@@ -2,6 +2,7 @@
 
 #include "calibration/path_scale.h"
 #include "mapping/map_keyframe.h"
+#include "system/use_calibration.h"
 
 namespace bslam::system {
 namespace {
@@ -60,8 +61,7 @@ execution::StageResult calibrate(const Config& config, const camera::Rig& given_
   if (!refinement) return {};
   calibration::keep_scale(config.calibration, *refinement);
   map::MapDraft draft(base);
-  calibration::apply(*refinement, draft);
-  mapping::adjust_globally(config.mapping, config.feature_model(), draft, stop);
+  use_calibration(*refinement, config, draft, stop);
   const KeyframeId newest = base->newest_keyframe();
   if (draft.map().alive(newest) && draft.map().root_of(newest) >= first)
     calibration::move_submap(newest, base->keyframe(newest).T_rig_world, draft);

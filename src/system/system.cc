@@ -9,6 +9,7 @@
 #include "system/cameras_of_run.h"
 #include "system/final_poses.h"
 #include "system/relocaliser.h"
+#include "system/use_calibration.h"
 
 namespace bslam::system {
 namespace {
@@ -291,15 +292,20 @@ void System::locate_early_frames() {
   }
 }
 
-// Estimates the calibration from the map. If it is accepted, adjusts the map again with it.
+// Estimates the calibration from the map. If it is accepted, adjusts the map again with it. With new moves of cameras,
+// it is estimated again.
 void System::calibrate(map::MapDraft& draft, const std::stop_token& stop) {
   const auto& options = config_.calibration;
   if ((!options.check && options.refine == calibration::Refine::kFalse) || stop.stop_requested()) return;
   const Stopwatch watch;
-  calibration_ = calibration::refine_rig(draft.map(), rig_, options, config_.feature_model(), stop, first_keyframe_);
-  if (calibration::accepted(calibration_, options)) {
-    calibration::apply(calibration_, draft);
-    final_adjustment_ = mapping::adjust_globally(config_.mapping, config_.feature_model(), draft, stop);
+  constexpr int kMaxEstimates = 3;
+  bool again = true;
+  for (int i = 0; i < kMaxEstimates && again && !stop.stop_requested(); ++i) {
+    calibration_ = calibration::refine_rig(draft.map(), rig_, options, config_.feature_model(), stop, first_keyframe_);
+    if (!calibration::accepted(calibration_, options)) break;
+    const CalibrationUse use = use_calibration(calibration_, config_, draft, stop);
+    final_adjustment_ = use.adjustment;
+    again = use.new_moves;
   }
   calibration_.poses = {};                                   // part of the map now
   if (!draft.map().rig().same_calibration(*initial_rig_)) {  // a calibration during the run moves the roots

@@ -48,18 +48,23 @@ synthetic::FeatureSimulator simulator(const camera::Rig& rig) {
   return {rig, synthetic::make_orbit({.duration_s = 60}), options};
 }
 
-// A map of a rig of which cameras, not camera 0, were moved, adjusted as if they had not been. A camera that is moved
-// twice is given with its extrinsics relative to those at the beginning.
-map::BundledMap map_of(const camera::Rig& rig, std::vector<Moved> moves) {
-  map::SimulatedMap out(simulator(rig));
+// The rig after moves of cameras, but not of camera 0, at keyframe i. The last one of a camera counts.
+camera::Rig rig_at(const camera::Rig& rig, std::span<const Moved> moves, int i) {
   camera::Rig now = rig;
-  for (int i = 0; i < kKeyframes; ++i) {
-    for (Moved moved : moves) {
-      if (i != moved.keyframe) continue;
-      moved.T_after_initial = moved.T_after_initial * rig.cam_from_rig(moved.camera) * now.rig_from_cam(moved.camera);
-      now = with_extrinsics(now, moved);
-      out.sim = simulator(now);
-    }
+  for (Moved moved : moves) {
+    if (i < moved.keyframe) continue;
+    moved.T_after_initial = moved.T_after_initial * rig.cam_from_rig(moved.camera) * now.rig_from_cam(moved.camera);
+    now = with_extrinsics(now, moved);
+  }
+  return now;
+}
+
+// A map of a rig of which cameras were moved, adjusted as if they had not been. `order`: of the creation of keyframes.
+map::BundledMap map_of(const camera::Rig& rig, std::span<const Moved> moves, std::span<const int> order = {}) {
+  map::SimulatedMap out(simulator(rig));
+  for (int n = 0; n < kKeyframes; ++n) {
+    const int i = order.empty() ? n : order[static_cast<std::size_t>(n)];
+    out.sim = simulator(rig_at(rig, moves, i));
     out.add_keyframe(FrameId(i), kStep_s * i);
   }
   adjustment::Selection all;
@@ -70,7 +75,7 @@ map::BundledMap map_of(const camera::Rig& rig, std::vector<Moved> moves) {
   EXPECT_TRUE(adjustment::adjust_map(all, {}, kFeatures, draft).done);
   return draft.map();
 }
-map::BundledMap map_of(const camera::Rig& rig, const Moved& moved) { return map_of(rig, std::vector{moved}); }
+map::BundledMap map_of(const camera::Rig& rig, const Moved& moved) { return map_of(rig, std::span(&moved, 1)); }
 
 RigRefinement refined(const map::BundledMap& map) { return refine_rig(map, map.rig(), kIndependent, kFeatures); }
 
@@ -124,6 +129,22 @@ TEST(MovedCamera, StaysAsItWasFound) {
   EXPECT_NEAR(second.moves[0].change_deg, first.moves[0].change_deg, 0.01);
   for (std::size_t c = 1; c < map.rig().size(); ++c)
     EXPECT_LT(map::angle_rad(second.rig->cam_from_rig(c), first.rig->cam_from_rig(c)), 0.02 * kDegree) << c;
+}
+
+// Threads may create keyframes later than others that were captured after them. The keyframes of a loaded map have
+// times of their own, though.
+TEST(MovedCamera, IsFoundIfKeyframesAreNotInOrderOfTime) {
+  const camera::Rig rig = synthetic::default_rig();
+  const Moved moved{1, 12, turn({0, 0.4, 0})};
+  std::vector<int> order(kKeyframes);
+  for (int n = 0; n < kKeyframes; ++n) order[static_cast<std::size_t>(n)] = (n + kKeyframes / 2) % kKeyframes;
+  const map::BundledMap map = map_of(rig, std::span(&moved, 1), order);
+  const RigRefinement result = refined(map);
+  ASSERT_EQ(result.moves.size(), 1u);
+  EXPECT_NEAR(to_seconds(result.moves[0].time_ns), kStep_s * moved.keyframe, 1e-6);
+  EXPECT_NEAR(result.moves[0].change_deg, 0.4, 0.03);
+  const KeyframeId first(kKeyframes / 2);
+  EXPECT_TRUE(refine_rig(map, map.rig(), kIndependent, kFeatures, {}, first).moves.empty());
 }
 
 TEST(MovedCamera, MayMoveTwiceAndOthersAsWell) {
