@@ -301,8 +301,10 @@ void System::calibrate(map::MapDraft& draft, const std::stop_token& stop) {
   constexpr int kMaxEstimates = 3;
   bool again = true;
   for (int i = 0; i < kMaxEstimates && again && !stop.stop_requested(); ++i) {
-    calibration_ = calibration::refine_rig(draft.map(), rig_, options, config_.feature_model(), stop, first_keyframe_);
-    if (!calibration::accepted(calibration_, options)) break;
+    auto estimate = calibration::refine_rig(draft.map(), rig_, options, config_.feature_model(), stop, first_keyframe_);
+    const bool accepted = calibration::accepted(estimate, options);
+    if (i == 0 || accepted) calibration_ = std::move(estimate);
+    if (!accepted) break;
     const CalibrationUse use = use_calibration(calibration_, config_, draft, stop);
     final_adjustment_ = use.adjustment;
     again = use.new_moves;
