@@ -46,23 +46,18 @@ void add_landmark(const map::BundledMap& map, LandmarkId id, const std::vector<i
   flat.problem.points.push_back(map.landmark(id).position);
 }
 
-// Motion of the rig between each keyframe's time and the capture times of its images; empty if all images of all
-// keyframes were captured at the same time, and no camera was moved. A move of a camera, T_after_initial T_cam_rig, is
-// the motion T_cam_rig^-1 T_after_initial T_cam_rig of the rig as this camera sees it.
+// The motions with the moves of cameras. A move, T_after_initial T_cam_rig, is the motion
+// T_cam_rig^-1 T_after_initial T_cam_rig of the rig as this camera sees it.
 std::vector<geometry::SE3> motions(const map::BundledMap& map, const std::vector<KeyframeId>& keyframes) {
-  std::vector<geometry::SE3> out;
-  bool any = false;
-  for (const KeyframeId k : keyframes) {
-    for (std::size_t c = 0; c < map.rig().size(); ++c) {
-      any |= map.keyframe(k).frame->delay_s(c) != 0.0;
-      out.push_back(map.motion_until(k, CameraIndex(c)));
-      if (map.rig().moves().empty()) continue;
-      any = true;
-      out.back() =
-          map.rig().rig_from_cam(c) * map.rig().cam_from_rig_at(c, map.keyframe(k).frame->time_ns) * out.back();
-    }
+  std::vector<geometry::SE3> out = motions_without_moves(map, keyframes);
+  const camera::Rig& rig = map.rig();
+  if (rig.moves().empty()) return out;
+  out.resize(keyframes.size() * rig.size());  // without motions, they are the identity
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const std::size_t c = i % rig.size();
+    const TimeNs time_ns = map.keyframe(keyframes[i / rig.size()]).frame->time_ns;
+    out[i] = rig.rig_from_cam(c) * rig.cam_from_rig_at(c, time_ns) * out[i];
   }
-  if (!any) out.clear();
   return out;
 }
 
@@ -80,6 +75,19 @@ std::vector<geometry::Vector6d> twists(const map::BundledMap& map, const std::ve
 std::vector<int> index_by_keyframe(const map::BundledMap& map, const std::vector<KeyframeId>& keyframes) {
   std::vector<int> out(map.keyframe_slots(), -1);
   for (std::size_t i = 0; i < keyframes.size(); ++i) out[keyframes[i].index()] = static_cast<int>(i);
+  return out;
+}
+
+std::vector<geometry::SE3> motions_without_moves(const map::BundledMap& map, const std::vector<KeyframeId>& keyframes) {
+  std::vector<geometry::SE3> out;
+  bool any = false;
+  for (const KeyframeId k : keyframes) {
+    for (std::size_t c = 0; c < map.rig().size(); ++c) {
+      any |= map.keyframe(k).frame->delay_s(c) != 0.0;
+      out.push_back(map.motion_until(k, CameraIndex(c)));
+    }
+  }
+  if (!any) out.clear();
   return out;
 }
 

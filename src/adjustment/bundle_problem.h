@@ -38,6 +38,10 @@ struct BundleProblem {
 // The index of each keyframe of the map in `keyframes`, by KeyframeId::index(); -1 for the others.
 std::vector<int> index_by_keyframe(const map::BundledMap& map, const std::vector<KeyframeId>& keyframes);
 
+// Motion of the rig between each keyframe's time and the capture times of its images, without moves of cameras; empty
+// if all images of all keyframes were captured at the times of the keyframes.
+std::vector<geometry::SE3> motions_without_moves(const map::BundledMap& map, const std::vector<KeyframeId>& keyframes);
+
 // Builds the problem. Landmarks observed by fewer than two of the keyframes are ignored. `features` determines the
 // standard deviation of a keypoint that is not aligned to its landmark's patch. The map must outlive the problem.
 BundleProblem build_problem(const map::BundledMap& map, const Selection& selection,

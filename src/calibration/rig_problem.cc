@@ -134,21 +134,6 @@ std::vector<std::size_t> groups(const map::BundledMap& map, const std::vector<Ke
   return group;
 }
 
-// Motion of the rig until the capture times of the images of these keyframes, without the moves of cameras; empty if
-// all capture times are those of the keyframes.
-std::vector<geometry::SE3> motions_without_moves(const map::BundledMap& map, const std::vector<KeyframeId>& keyframes) {
-  std::vector<geometry::SE3> out;
-  bool any = false;
-  for (const KeyframeId k : keyframes) {
-    for (std::size_t c = 0; c < map.rig().size(); ++c) {
-      any |= map.keyframe(k).frame->delay_s(c) != 0.0;
-      out.push_back(map.motion_until(k, CameraIndex(c)));
-    }
-  }
-  if (!any) out.clear();
-  return out;
-}
-
 }  // namespace
 
 RigProblem choose(const map::BundledMap& map, bool timing, const CalibrationOptions& options,
@@ -162,7 +147,7 @@ RigProblem choose(const map::BundledMap& map, bool timing, const CalibrationOpti
     (out.group[i] == i ? selection.fixed_keyframes : selection.free_keyframes).push_back(keyframes[i]);
   }
   out.flat = adjustment::build_problem(map, selection, features);
-  if (!map.rig().moves().empty()) out.flat.problem.motion = motions_without_moves(map, out.flat.keyframes);
+  if (!map.rig().moves().empty()) out.flat.problem.motion = adjustment::motions_without_moves(map, out.flat.keyframes);
   const geometry::SE3 &T_cam0_rig = map.rig().cam_from_rig(0), &T_rig_cam0 = map.rig().rig_from_cam(0);
   for (geometry::SE3& T_cam0_world : out.flat.problem.T_rig_world) T_cam0_world = T_cam0_rig * T_cam0_world;
   for (geometry::SE3& motion : out.flat.problem.motion) motion = T_cam0_rig * motion * T_rig_cam0;

@@ -6,7 +6,7 @@
 #include <limits>
 #include <numbers>
 
-#include "adjustment/map_adjustment.h"
+#include "calibration/adjusted_map.h"
 #include "mapping/simulated_map.h"
 
 namespace bslam::calibration::moves {
@@ -67,13 +67,7 @@ map::BundledMap map_of(const camera::Rig& rig, std::span<const Moved> moves, std
     out.sim = simulator(rig_at(rig, moves, i));
     out.add_keyframe(FrameId(i), kStep_s * i);
   }
-  adjustment::Selection all;
-  for (const KeyframeId k : out.map.keyframe_ids())
-    (k.value() == 0 ? all.fixed_keyframes : all.free_keyframes).push_back(k);
-  all.landmarks = out.map.landmark_ids();
-  map::MapDraft draft = out.draft();
-  EXPECT_TRUE(adjustment::adjust_map(all, {}, kFeatures, draft).done);
-  return draft.map();
+  return map::adjusted(out, kFeatures);
 }
 map::BundledMap map_of(const camera::Rig& rig, const Moved& moved) { return map_of(rig, std::span(&moved, 1)); }
 

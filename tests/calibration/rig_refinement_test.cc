@@ -4,8 +4,8 @@
 
 #include <numbers>
 
-#include "adjustment/map_adjustment.h"
 #include "base/random.h"
+#include "calibration/adjusted_map.h"
 #include "calibration/calibration_prior.h"
 #include "calibration/path_scale.h"
 #include "camera/model_parameters.h"
@@ -47,13 +47,7 @@ map::SimulatedMap mapped(const camera::Rig& truth, const camera::Rig& calibrated
   if (missing_camera)
     out.change_frame = [&](auto& frame) { tracking::remove_camera(truth, *missing_camera, 0.01, 16, frame); };
   for (int i = 0; i < keyframes; ++i) out.add_keyframe(FrameId(i), step_s * i);
-  adjustment::Selection all;
-  for (const KeyframeId k : out.map.keyframe_ids())
-    (k.value() == 0 ? all.fixed_keyframes : all.free_keyframes).push_back(k);
-  all.landmarks = out.map.landmark_ids();
-  map::MapDraft draft = out.draft();
-  EXPECT_TRUE(adjustment::adjust_map(all, {}, kFeatures, draft).done);
-  out.map = draft.map();
+  out.map = map::adjusted(out, kFeatures);
   out.change_frame = {};
   return out;
 }
