@@ -5,6 +5,8 @@ namespace bslam_ros {
 PoseOutput PoseConverter::convert(const bslam::FrameResult& frame) {
   PoseOutput out;
   out.time_ns = frame.time_ns;
+  if (!has_base_cam0_) T_base_cam0_ = frame.T_odom_body.inverse() * frame.T_odom_cam0;
+  has_base_cam0_ = true;
   const Pose T_start_base = T_base_cam0_ * frame.T_odom_body;
   if (restarted_) T_odom_start_ = T_odom_base_ * T_start_base.inverse();
   restarted_ = false;

@@ -9,12 +9,13 @@
 
 namespace bslam_ros {
 
-// `map` and `odom` of ROS are the frames `world` and `odom` of the library, whose axes are those of camera 0, moved by
-// T_base_cam0: at the start base_link is at the origin, with x forward, y left and z up. The odometry pose is continued
-// when another System takes over.
+// `map` and `odom` of ROS are the frames `world` and `odom` of the library, whose axes are those of the reported camera
+// 0 (RigFrame::kCamera0), moved by its pose T_base_cam0 on the robot: at the start base_link is at the origin, with x
+// forward, y left and z up. The odometry pose is continued when another System takes over.
 class PoseConverter {
  public:
-  // The body frame of the rig must be base_link.
+  // The body frame of the rig must be base_link. Until the first frame, T_base_cam0 is that of the calibration, from
+  // which it differs by a rotation if a refinement has moved the principal point of camera 0.
   explicit PoseConverter(const bslam::Rig& rig) : T_base_cam0_(rig.camera(0).T_body_cam) {}
 
   // The next frame is that of another System, whose odometry begins at the present pose.
@@ -28,8 +29,9 @@ class PoseConverter {
 
  private:
   Pose T_base_cam0_;
-  Pose T_odom_start_;  // from the odometry of the present System to that of the first one
-  Pose T_odom_base_;   // last one
+  bool has_base_cam0_ = false;  // T_base_cam0_ is that of the frames
+  Pose T_odom_start_;           // from the odometry of the present System to that of the first one
+  Pose T_odom_base_;            // last one
   bool restarted_ = false;
 };
 

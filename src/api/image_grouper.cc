@@ -145,11 +145,12 @@ TimeNs ImageGrouper::complete_until(std::size_t c) const {
 }
 
 // Groups all waiting images. The last bundle with an image of camera 0 takes part, because images that are nearest to
-// its image of camera 0 must not join another bundle.
+// its image of camera 0 must not join another bundle. All its images stand at the time of camera 0's, so that none of
+// them can join a frame of a later image of camera 0, to which it may be nearer.
 image::FrameGroups ImageGrouper::grouped() const {
   std::vector<std::vector<TimeNs>> times(cameras_.size());
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
-    if (last_group_with_camera0_[c]) times[c].push_back(in_phase(c, *last_group_with_camera0_[c]));
+    if (last_group_with_camera0_[c]) times[c].push_back(*last_group_with_camera0_[0]);
     for (const WaitingImage& w : cameras_[c].waiting) times[c].push_back(in_phase(c, w.time_ns));
   }
   image::FrameGroups groups = image::group_frames(times, phases_.tolerance_ns);

@@ -94,8 +94,8 @@ TimeNs shift_of(const camera::Rig& given, const camera::Rig& final_rig, std::siz
   return final_rig.camera(camera).time_offset_ns - given.camera(camera).time_offset_ns;
 }
 
-// Whether mirrored images, exchanged cameras or inverted transforms explain clearly more matches of a pair than its
-// calibration before and after refinement.
+// Whether mirrored or rotated images, exchanged cameras or inverted transforms explain clearly more matches of a pair
+// than its calibration before and after refinement.
 bool is_mistaken(const PairEvidence& given, const PairEvidence& refined) {
   constexpr double kMuchMore = 0.15;  // share of matches
   if (!given.verdict || given.verdict == Convention::kAsGiven) return false;

@@ -37,11 +37,11 @@ std::vector<PixelPair> match(const feature::Detections& a, const feature::Detect
 }
 
 // A convention applied to a pair: the calibrations of the first and second image, the transform between them, and
-// whether both images are mirrored.
+// whether both images are flipped left to right, and top to bottom.
 struct Hypothesis {
   const camera::Camera *first, *second;
   SE3 T_second_first;
-  bool mirrored = false;
+  bool left_to_right = false, top_to_bottom = false;
 };
 
 Hypothesis hypothesis_of(Convention convention, const camera::Rig& rig, std::size_t i, std::size_t j) {
@@ -59,6 +59,8 @@ Hypothesis hypothesis_of(Convention convention, const camera::Rig& rig, std::siz
       return {&cj, &ci, given.inverse()};
     case Convention::kMirrored:
       return {&ci, &cj, given, true};
+    case Convention::kUpsideDown:
+      return {&ci, &cj, given, true, true};
     case Convention::kSwappedInverse:
       break;
   }
@@ -70,19 +72,21 @@ double tolerance_of(const camera::Camera& first, const camera::Camera& second) {
   return kTolerancePx * std::max(first.radians_per_pixel(), second.radians_per_pixel());
 }
 
-// The pairs in images that are mirrored, left to right.
-std::vector<PixelPair> mirrored(std::span<const PixelPair> pairs, const camera::Camera& first,
-                                const camera::Camera& second) {
+// The pairs in images that are flipped as in the hypothesis.
+std::vector<PixelPair> flipped(const Hypothesis& h, std::span<const PixelPair> pairs) {
   std::vector<PixelPair> out(pairs.begin(), pairs.end());
   for (PixelPair& pair : out) {
-    pair.a.x() = first.width - 1 - pair.a.x();
-    pair.b.x() = second.width - 1 - pair.b.x();
+    if (h.left_to_right) pair.a.x() = h.first->width - 1 - pair.a.x();
+    if (h.left_to_right) pair.b.x() = h.second->width - 1 - pair.b.x();
+    if (h.top_to_bottom) pair.a.y() = h.first->height - 1 - pair.a.y();
+    if (h.top_to_bottom) pair.b.y() = h.second->height - 1 - pair.b.y();
   }
   return out;
 }
 
 int count_agreeing(const Hypothesis& h, std::span<const PixelPair> pairs) {
-  if (h.mirrored) return count_agreeing({h.first, h.second, h.T_second_first}, mirrored(pairs, *h.first, *h.second));
+  if (h.left_to_right || h.top_to_bottom)
+    return count_agreeing({h.first, h.second, h.T_second_first}, flipped(h, pairs));
   const double tolerance = tolerance_of(*h.first, *h.second);
   const Eigen::Vector3d t = h.T_second_first.translation();
   const bool apart = t.norm() > kNoBaseline;
@@ -145,8 +149,8 @@ std::optional<Convention> verdict_of(const PairEvidence& evidence) {
   if (*best < kMinAgreeing || *best < kMinRatio * evidence.matches) return std::nullopt;
   if (*best < kClearly * evidence.agreeing[0]) return Convention::kAsGiven;
   const auto found = static_cast<Convention>(best - evidence.agreeing.begin());
-  const bool exchanged = found == Convention::kMirrored && evidence.fits_as_well_mirrored(Convention::kSwapped);
-  return exchanged ? Convention::kSwapped : found;
+  const bool of_images = found == Convention::kMirrored || found == Convention::kUpsideDown;
+  return of_images && evidence.fit_as_well(found, Convention::kSwapped) ? Convention::kSwapped : found;
 }
 
 }  // namespace
@@ -156,9 +160,9 @@ bool OtherPose::is_another_arrangement() const {
   return rotated_deg > kRotation_deg || displaced_deg > kDisplacement_deg;
 }
 
-bool PairEvidence::fits_as_well_mirrored(Convention convention) const {
+bool PairEvidence::fit_as_well(Convention a, Convention b) const {
   constexpr double kAsMany = 0.95;
-  const auto [less, more] = std::minmax({with(Convention::kMirrored), with(convention)});
+  const auto [less, more] = std::minmax({with(a), with(b)});
   return less >= kAsMany * more;
 }
 

@@ -25,9 +25,10 @@ enum class Convention {
   kPairInverse,     // the transform between the two cameras is inverted
   kSwapped,         // the images or the calibrations of the two cameras are exchanged
   kSwappedInverse,  // exchanged cameras and inverted transforms
-  kMirrored         // the images of both cameras are mirrored, left to right
+  kMirrored,        // the images of both cameras are mirrored, left to right
+  kUpsideDown       // the images of both cameras are rotated by 180 degrees
 };
-constexpr int kConventions = 6;
+constexpr int kConventions = 7;
 std::string_view convention_in_words(Convention convention);
 
 // A relative pose of the two cameras that is consistent with clearly more matches than any convention.
@@ -70,9 +71,9 @@ struct PairEvidence {
 
   int with(Convention convention) const { return agreeing[static_cast<std::size_t>(convention)]; }
   bool is_judged() const { return verdict || exchanged || other || mirrored; }
-  // Whether as many matches are consistent if the images of both cameras are mirrored: to cameras side by side and
-  // without rotation, exchanged and mirrored images look the same.
-  bool fits_as_well_mirrored(Convention convention) const;
+  // Whether about as many matches are consistent with the one as with the other: for cameras side by side and without
+  // rotation, exchanged cameras, mirrored images and images that are upside down look the same.
+  bool fit_as_well(Convention a, Convention b) const;
 };
 
 // If the share of consistent matches is smaller, another pose of the cameras is searched for.

@@ -22,6 +22,8 @@ std::string_view convention_in_words(Convention convention) {
       return "with the two cameras exchanged";
     case Convention::kMirrored:
       return "if the images of both cameras are mirrored left to right";
+    case Convention::kUpsideDown:
+      return "if the images of both cameras are rotated by 180 degrees";
     case Convention::kSwappedInverse:
       break;
   }
@@ -30,17 +32,20 @@ std::string_view convention_in_words(Convention convention) {
 
 namespace {
 
-constexpr const char* kOrMirrored = ", or if the images of both cameras are mirrored left to right";
-
 // Returns true if there are so many matches that some convention should fit, but none does.
 bool fits_no_convention(const PairEvidence& pair) {
   constexpr int kMany = 300;  // matches
   return !pair.verdict && pair.matches > kMany;
 }
 
-// Returns true if mirrored images explain as many matches as the mistake that was found.
-bool may_be_mirrored(const PairEvidence& pair) {
-  return pair.verdict && *pair.verdict != Convention::kMirrored && pair.fits_as_well_mirrored(*pair.verdict);
+// The other mistakes that explain as many matches as the one that was found, in words.
+std::string or_by_images(const PairEvidence& pair) {
+  std::string text;
+  for (const Convention other : {Convention::kMirrored, Convention::kUpsideDown}) {
+    if (pair.verdict && *pair.verdict != other && pair.fit_as_well(*pair.verdict, other))
+      text += fmt::format(", or {}", convention_in_words(other));
+  }
+  return text;
 }
 
 }  // namespace
@@ -74,10 +79,8 @@ std::string describe_pair(const PairEvidence& pair) {
                        pair.matches, 100 * pair.overlap);
   std::string text = fmt::format("{} of {} matches are consistent with the calibration {}", pair.with(*pair.verdict),
                                  pair.matches, convention_in_words(*pair.verdict));
-  if (*pair.verdict != Convention::kAsGiven) {
-    if (may_be_mirrored(pair)) text += kOrMirrored;
-    return text + fmt::format("; {} with it as given", pair.with(Convention::kAsGiven));
-  }
+  if (*pair.verdict != Convention::kAsGiven)
+    return text + fmt::format("{}; {} with it as given", or_by_images(pair), pair.with(Convention::kAsGiven));
   if (pair.with(Convention::kAsGiven) < kGoodShare * pair.matches)
     text += "; this is few: many matches are wrong, or the intrinsics are inaccurate";
   return text;
@@ -139,7 +142,7 @@ std::string describe_evidence(std::span<const PairEvidence> evidence) {
   std::string text = "test against the images:\n";
   std::set<std::size_t> mirrored;
   std::map<Convention, std::vector<std::string>> mistakes;  // pairs
-  std::set<Convention> or_mirrored;
+  std::map<Convention, std::string> others_of;              // by mistake: others that explain as many matches
   int fitting = 0, elsewhere = 0, exchanged = 0;
   for (const PairEvidence& pair : evidence) {
     text += fmt::format("  cameras {} and {}: {}\n", pair.first, pair.second, describe_pair(pair));
@@ -149,7 +152,7 @@ std::string describe_evidence(std::span<const PairEvidence> evidence) {
     if (pair.verdict == Convention::kAsGiven) ++fitting;
     if (pair.verdict && pair.verdict != Convention::kAsGiven) {
       mistakes[*pair.verdict].push_back(name_of(pair));
-      if (may_be_mirrored(pair)) or_mirrored.insert(*pair.verdict);
+      if (const std::string or_others = or_by_images(pair); !or_others.empty()) others_of[*pair.verdict] = or_others;
     }
   }
   for (const std::size_t camera : mirrored)
@@ -162,8 +165,7 @@ std::string describe_evidence(std::span<const PairEvidence> evidence) {
     return text +
            fmt::format(
                "warning: the images of cameras {} contradict the extrinsics; they are consistent with them {}{}{}\n",
-               fmt::join(pairs, ", "), convention_in_words(most->first),
-               or_mirrored.contains(most->first) ? kOrMirrored : "", others);
+               fmt::join(pairs, ", "), convention_in_words(most->first), others_of[most->first], others);
   }
   if (exchanged > 0)
     return text + "warning: the images contradict the extrinsics; they are consistent with exchanged cameras\n";

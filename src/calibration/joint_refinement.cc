@@ -1,6 +1,7 @@
 #include "calibration/joint_refinement.h"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 
 #include "base/assert.h"
@@ -10,7 +11,9 @@ namespace {
 
 constexpr double kObservedRatio = 0.5;  // maximum standard deviation of an observed value, relative to the prior's
 
-// Returns the rig whose difference from `calibrated` is `change` (RigInformation), with the timing of `timed`.
+// Returns the rig whose difference from `calibrated` is `change` (RigInformation), with the timing of `timed`. The pose
+// of camera 0 on the body stays as given, while that of a rig refined during a run is corrected for a change of its
+// principal point (rig_frame.h), since here there are no poses that have to stay comparable.
 camera::Rig changed(const camera::Rig& calibrated, const Eigen::VectorXd& change, const camera::Rig& timed) {
   solver::RigValues values = solver::RigValues::of(calibrated.in_frame_of_camera_0());
   for (std::size_t c = 0; c < calibrated.size(); ++c) {
@@ -58,11 +61,17 @@ std::vector<CalibratedCamera> by_camera(const camera::Rig& calibrated, const Eig
   return out;
 }
 
+// The prior of a camera is wider if it was taken as displaced, and it is displaced in all recordings if it is in one.
+const Eigen::MatrixXd& widest_prior(std::span<const RigRefinement> refinements) {
+  const auto trace = [](const RigRefinement& r) { return r.information.prior.trace(); };
+  return std::ranges::min_element(refinements, {}, trace)->information.prior;
+}
+
 }  // namespace
 
 std::optional<JointRefinement> combine(const camera::Rig& calibrated, std::span<const RigRefinement> refinements) {
   BSLAM_ASSERT(!refinements.empty(), "there must be an estimate");
-  const Eigen::MatrixXd& prior = refinements.front().information.prior;
+  const Eigen::MatrixXd& prior = widest_prior(refinements);
   Eigen::MatrixXd information = prior;
   Eigen::VectorXd weighted = Eigen::VectorXd::Zero(prior.rows());
   for (const RigRefinement& r : refinements) {

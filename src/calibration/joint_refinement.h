@@ -28,9 +28,10 @@ struct JointRefinement {
   RigInformation information;
 };
 
-// Combines estimates from different recordings with the same prior, whose mean is the given calibration: the images are
-// weighted by their information, and the prior counts once. `refinements`: at least one; all `done`, of the same rig
-// `calibrated` and with intrinsics. Returns nullopt if the information is singular.
+// Combines estimates from different recordings with priors whose mean is the given calibration: the images are weighted
+// by their information, and the widest of the priors counts once, in any order of the recordings. `refinements`: at
+// least one; all `done`, of the same rig `calibrated` and with intrinsics. Returns nullopt if the information is
+// singular.
 std::optional<JointRefinement> combine(const camera::Rig& calibrated, std::span<const RigRefinement> refinements);
 
 }  // namespace bslam::calibration

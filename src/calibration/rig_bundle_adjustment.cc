@@ -30,6 +30,7 @@ struct CalibrationBlocks {
   const solver::ExtrinsicsBlock* extrinsics = nullptr;
   const solver::IntrinsicsBlock* intrinsics = nullptr;  // null if they are constant
   const solver::TimingBlock* timing = nullptr;          // null if it is constant
+  std::vector<std::uint8_t> displaced;                  // flags of ExtrinsicPrior
   int size = 0;                                         // number of unknowns
 
   int first_intrinsics() const { return extrinsics->size(); }
@@ -77,6 +78,7 @@ solver::ExtrinsicPrior extrinsic_prior(const solver::RigValues& calibrated, cons
 CalibrationBlocks make_blocks(const solver::RigValues& calibrated, const RigAdjustmentOptions& options,
                               const std::vector<std::uint8_t>& displaced) {
   CalibrationBlocks out;
+  out.displaced = displaced;
   const double tighter = 1.0 / std::sqrt(options.correlated_observations);
   auto extrinsics = std::make_unique<solver::ExtrinsicsBlock>(extrinsic_prior(calibrated, options, tighter, displaced));
   out.extrinsics = extrinsics.get();
@@ -235,7 +237,7 @@ bool assess(solver::BundleEquations& equations, const CalibrationBlocks& blocks,
   if (options.pose_effects)
     out.pose_effects =
         effects_on_poses(std::sqrt(options.correlated_observations) * factor.matrixU().solve(identity), equations);
-  report_extrinsics(covariance, extrinsic_prior(calibrated, options, 1.0), out);
+  report_extrinsics(covariance, extrinsic_prior(calibrated, options, 1.0, blocks.displaced), out);
   if (blocks.intrinsics != nullptr)
     report_intrinsics(covariance.diagonal().segment(blocks.first_intrinsics(), blocks.intrinsics->size()).cwiseSqrt(),
                       calibrated, options, out);

@@ -83,9 +83,9 @@ std::string describe_camera(const camera::Rig& rig, std::size_t i) {
   text += fmt::format("  in the body frame: at {} m, optical axis {}\n", vector_text(T_body_cam.translation()),
                       vector_text(T_body_cam.rotation() * Vector3d::UnitZ()));
   if (i > 0) {
-    const SE3& T_rig_cam = rig.rig_from_cam(i);
-    text += fmt::format("  from camera 0: {}; {}\n", displacement_in_words(T_rig_cam.translation()),
-                        direction_in_words(T_rig_cam.matrix3()));
+    const SE3 T_cam0_cam = rig.in_frame_of_camera_0().rig_from_cam(i);
+    text += fmt::format("  from camera 0: {}; {}\n", displacement_in_words(T_cam0_cam.translation()),
+                        direction_in_words(T_cam0_cam.matrix3()));
   }
   if (camera.time_offset_ns != 0) text += fmt::format("  time offset {:.6f} s\n", to_seconds(camera.time_offset_ns));
   if (camera.readout_s != 0) text += fmt::format("  rolling shutter, readout {:.6f} s\n", camera.readout_s);

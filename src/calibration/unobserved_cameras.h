@@ -8,7 +8,7 @@ namespace bslam::calibration {
 
 // Corrects the extrinsics of cameras with hardly any observations for the estimated intrinsics of camera 0. Calibrated
 // extrinsics are relative to the axes of camera 0 under the given intrinsics. If the estimated intrinsics rotate the
-// ray of the image centre by R_given_estimated, an unobserved camera has
+// rays of the pixels by R_given_estimated (the rotation that fits best, turn_of_rays), an unobserved camera has
 //     T_cam_rig = T_cam_rig,given R_given_estimated.
 // With the given extrinsics it would be inconsistent with the other cameras. Cameras of the estimate that `given` does
 // not have, which are those after a move (moved_camera.h), stay as they are.

@@ -181,6 +181,8 @@ bool Rig::same_calibration(const Rig& other) const {
   if (!same_intrinsics(other)) return false;
   for (std::size_t i = 0; i < size(); ++i) {
     if (body_from_cam(i).matrix() != other.body_from_cam(i).matrix()) return false;
+    const Camera &a = camera(i), &b = other.camera(i);
+    if (a.time_offset_ns != b.time_offset_ns || a.readout_s != b.readout_s) return false;
   }
   return std::ranges::equal(moves(), other.moves(), [](const CameraMove& a, const CameraMove& b) {
     return a.camera == b.camera && a.time_ns == b.time_ns && a.T_after_initial.matrix() == b.T_after_initial.matrix();

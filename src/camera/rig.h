@@ -99,7 +99,7 @@ class Rig {
   Rig with_calibration_of(const Rig& part, std::span<const int> indices) const;
 
   // Whether all cameras of two rigs have the same model with the same parameters, and whether they also have the same
-  // extrinsics and moves. The rigs must have the same number of cameras.
+  // time offsets, readout times, extrinsics and moves. The rigs must have the same number of cameras.
   bool same_intrinsics(const Rig& other) const;
   bool same_calibration(const Rig& other) const;
 

@@ -310,6 +310,7 @@ Result<std::vector<NamedText>> colmap_rig_texts(const camera::Rig& rig, const st
                                     camera::Fov::kName},
                          .body_frame = false};
   if (const Status status = check_limits(rig, out, limits); !status) return status.error();
+  const camera::Rig from_camera_0 = rig.in_frame_of_camera_0();  // the reference sensor has no pose
   std::string cameras = "# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n";
   std::string rigs =
       "# RIG_ID, NUM_SENSORS, REF_SENSOR_TYPE, REF_SENSOR_ID, SENSORS[] as (SENSOR_TYPE, SENSOR_ID, "
@@ -326,7 +327,7 @@ Result<std::vector<NamedText>> colmap_rig_texts(const camera::Rig& rig, const st
     if (i == 0) {
       config += "\"ref_sensor\": true}";
     } else {
-      const SE3& T = rig.cam_from_rig(i);
+      const SE3& T = from_camera_0.cam_from_rig(i);
       const geometry::Quaterniond& q = T.rotation();
       const auto pose = [&](std::string_view separator, std::size_t from, std::size_t to) {
         const std::array<double, 7> all = {

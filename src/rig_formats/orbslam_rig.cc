@@ -254,7 +254,8 @@ Result<std::string> orbslam_rig_text(const camera::Rig& rig, const std::string& 
   std::string text = fmt::format("%YAML:1.0\n\nFile.version: \"1.0\"\nCamera.type: \"{}\"\n\n{}",
                                  fisheye(first) ? "KannalaBrandt8" : "PinHole", model_text(first.model, 1));
   if (rig.size() == 2) {
-    text += model_text(last.model, 2) + matrix_text("Stereo.T_c1_c2", rig.rig_from_cam(1)) + "Stereo.ThDepth: 40.0\n";
+    text += model_text(last.model, 2) + matrix_text("Stereo.T_c1_c2", rig.in_frame_of_camera_0().rig_from_cam(1)) +
+            "Stereo.ThDepth: 40.0\n";
     for (int number = 1; fisheye(first) && number <= 2; ++number) {
       text += fmt::format("Camera{0}.overlappingBegin: 0\nCamera{0}.overlappingEnd: {1}\n", number, first.width - 1);
     }

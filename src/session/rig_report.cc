@@ -29,6 +29,7 @@ Json camera_json(const camera::Rig& rig, std::size_t i) {
   const camera::Intrinsics& k = camera::intrinsics(camera.model);
   const calibration::FieldOfView view = calibration::field_of_view(camera);
   const geometry::SE3& T = rig.body_from_cam(i);
+  const geometry::SE3 T_cam0_cam = rig.in_frame_of_camera_0().rig_from_cam(i);
   Json overlaps = Json::array();
   for (std::size_t j = 0; j < rig.size(); ++j) overlaps.push_back(i == j ? 1.0 : rig.overlap_share(i, j));
   return {{"name", camera.name},
@@ -42,8 +43,8 @@ Json camera_json(const camera::Rig& rig, std::size_t i) {
             {"diagonal", geometry::degrees(view.diagonal)}}},
           {"position_body", vector_json(T.translation())},
           {"optical_axis_body", vector_json(T.rotation() * Eigen::Vector3d::UnitZ())},
-          {"position_cam0", vector_json(rig.rig_from_cam(i).translation())},
-          {"optical_axis_cam0", vector_json(rig.rig_from_cam(i).rotation() * Eigen::Vector3d::UnitZ())},
+          {"position_cam0", vector_json(T_cam0_cam.translation())},
+          {"optical_axis_cam0", vector_json(T_cam0_cam.rotation() * Eigen::Vector3d::UnitZ())},
           {"time_offset_s", static_cast<double>(camera.time_offset_ns) / 1e9},
           {"rolling_shutter_readout_s", camera.readout_s},
           {"mask", camera.mask_file.empty() ? Json() : Json(camera.mask_file)},
@@ -62,6 +63,7 @@ Json evidence_json(const std::vector<PairEvidence>& evidence) {
                      {"fit_swapped", pair.agreeing[3]},
                      {"fit_swapped_inverted", pair.agreeing[4]},
                      {"fit_mirrored", pair.agreeing[5]},
+                     {"fit_upside_down", pair.agreeing[6]},
                      {"fit_exchanged", pair.exchanged ? Json(pair.exchanged->agreeing) : Json()},
                      {"exchanged_for", pair.exchanged ? Json(pair.exchanged->cameras) : Json()},
                      {"fit_another", pair.other ? Json(pair.other->agreeing) : Json()},

@@ -4,6 +4,12 @@ namespace bslam::tracking {
 
 using geometry::SE3;
 
+bool keeps_twist(const TrackerState& state, TimeNs time_ns) {
+  constexpr double kFastest_s = 0.005;
+  const double dt = to_seconds(time_ns - state.time_ns);
+  return dt > 0 && dt < kFastest_s && state.twist && !state.twist_kept;
+}
+
 SE3 last_pose(const TrackInput& input) { return input.state.anchored.resolve(input.map).value(); }
 
 std::optional<SE3> motion_since_last(const TrackerState& state, TimeNs time_ns) {
@@ -22,6 +28,10 @@ solver::MotionModel motion_model(const TrackInput& input, const frame::BundledFr
   const double dt = to_seconds(frame.time_ns - input.state.time_ns);
   if (dt <= 0 || dt > kMaxPrediction_s) {
     motion.offset = frame.twist;  // nothing newer is known
+    return motion;
+  }
+  if (keeps_twist(input.state, frame.time_ns)) {
+    motion.offset = *input.state.twist;
     return motion;
   }
   motion.gain = 1.0 / dt;

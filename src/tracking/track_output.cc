@@ -73,14 +73,11 @@ geometry::Matrix6d covariance_of(const solver::PoseSolution& solution, const map
   return 0.5 * (covariance + covariance.transpose());
 }
 
-// The mean twist since the frame before. Frames that follow each other much faster than cameras record have stamps of
-// their arrival, or are two images of one instant: noise would make the twist arbitrarily large, so that the one before
-// is kept, but not twice in a row, since some cameras are that fast.
+// The mean twist since the frame before.
 void update_twist(const TrackInput& input, TimeNs time_ns, const geometry::SE3& T_rig_world, TrackerState& state) {
-  constexpr double kFastest_s = 0.005;
-  const double dt = to_seconds(time_ns - input.state.time_ns);
-  state.twist_kept = dt > 0 && dt < kFastest_s && state.twist && !state.twist_kept;
+  state.twist_kept = keeps_twist(input.state, time_ns);
   if (state.twist_kept) return;
+  const double dt = to_seconds(time_ns - input.state.time_ns);
   state.twist.reset();
   if (dt <= 0 || dt > kMaxPrediction_s) return;
   state.twist = (T_rig_world * last_pose(input).inverse()).log() / dt;

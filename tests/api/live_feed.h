@@ -72,6 +72,7 @@ class Feed {
   }
 
   Times bundles;
+  std::vector<std::vector<std::int64_t>> exact;  // the same in nanoseconds
   std::vector<DroppedImage> dropped;
   Synchronizer synchronizer;
 
@@ -81,7 +82,11 @@ class Feed {
     return options;
   }
   void fetch() {
-    while (const auto bundle = synchronizer.pop()) bundles.push_back(times_of(*bundle));
+    while (const auto bundle = synchronizer.pop()) {
+      bundles.push_back(times_of(*bundle));
+      exact.emplace_back();
+      for (const CameraImage& i : bundle->images) exact.back().push_back(i.data == nullptr ? -1 : i.time_ns);
+    }
   }
 };
 

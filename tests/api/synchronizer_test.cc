@@ -8,6 +8,7 @@
 #include <atomic>
 #include <fstream>
 #include <limits>
+#include <map>
 #include <memory>
 #include <stdexcept>
 #include <thread>
@@ -105,6 +106,38 @@ TEST(Synchronizer, LeavesLostImagesEmpty) {
   feed.push(kept);
   EXPECT_EQ(feed.close(), as_recorded(kept, 3));
   EXPECT_TRUE(feed.dropped.empty());
+}
+
+// Returns the number of images of `shots` that are neither in exactly one bundle nor dropped exactly once.
+std::size_t lost_or_repeated(const std::vector<Shot>& shots, const Feed& feed) {
+  std::map<std::pair<std::size_t, std::int64_t>, int> uses;
+  for (const std::vector<std::int64_t>& bundle : feed.exact) {
+    for (std::size_t c = 0; c < bundle.size(); ++c) {
+      if (bundle[c] >= 0) ++uses[{c, bundle[c]}];
+    }
+  }
+  for (const DroppedImage& d : feed.dropped) ++uses[{d.camera, d.time_ns}];
+  return static_cast<std::size_t>(std::ranges::count_if(shots, [&](const Shot& s) {
+    return uses[{s.camera, s.time_ns}] != 1;
+  }));
+}
+
+TEST(Synchronizer, AnImageOfCamera0AfterABundleDoesNotUseItsImagesAgain) {
+  for (const double delay_ms : {0.3, 0.8, 1.5, 1.9}) {
+    for (const double extra_ms : {1.0, 2.0, 3.0, 3.7, 5.0}) {
+      std::vector<Shot> shots;
+      for (std::int64_t k = 20; k < 40; ++k) {
+        shots.push_back({0, k * 50 * kMs});
+        shots.push_back({1, k * 50 * kMs + static_cast<std::int64_t>(delay_ms * kMs)});
+        if (k == 30) shots.push_back({0, k * 50 * kMs + static_cast<std::int64_t>(extra_ms * kMs)});
+      }
+      Feed feed(2);
+      feed.push(shots);
+      feed.close();
+      EXPECT_EQ(lost_or_repeated(shots, feed), 0u) << delay_ms << " ms, " << extra_ms << " ms";
+      EXPECT_GE(feed.bundles.size(), 20u);
+    }
+  }
 }
 
 TEST(Synchronizer, DoesNotWaitForASilentCamera) {

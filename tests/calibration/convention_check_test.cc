@@ -70,7 +70,21 @@ TEST(ConventionCheck, FindsThatTheImagesOfBothCamerasAreMirrored) {
       << describe_pair(evidence);
 }
 
-// Of cameras side by side it cannot be told whether they are exchanged or both mirrored, and both are said.
+TEST(ConventionCheck, FindsThatTheImagesOfBothCamerasAreUpsideDown) {
+  const camera::Rig rig = camera::stereo_rig();
+  auto views = mirrored(views_of(rig), rig);
+  for (std::size_t c = 0; c < 2; ++c) {
+    for (auto& pixel : views[c].pixel) pixel.y() = static_cast<float>(rig.camera(c).height - 1) - pixel.y();
+  }
+  const PairEvidence evidence = judged(rig, views);
+  EXPECT_EQ(evidence.verdict, Convention::kUpsideDown) << describe_pair(evidence);
+  EXPECT_NE(describe_pair(evidence).find("150 of 150 matches are consistent with the calibration if the images of both "
+                                         "cameras are rotated by 180 degrees; "),
+            std::string::npos)
+      << describe_pair(evidence);
+}
+
+// Of cameras side by side it cannot be told whether they are exchanged, mirrored or upside down, and all is said.
 TEST(ConventionCheck, MirroredImagesOfASymmetricPairMayBeExchangedOnes) {
   const camera::Rig stereo = camera::stereo_rig();
   const SE3 step(geometry::so3_exp(Eigen::Vector3d::Zero()), {0.12, 0, 0});
@@ -79,8 +93,10 @@ TEST(ConventionCheck, MirroredImagesOfASymmetricPairMayBeExchangedOnes) {
   const PairEvidence evidence = judged(rig, mirrored(views_of(rig), rig));
   ASSERT_TRUE(evidence.verdict);
   EXPECT_NE(*evidence.verdict, Convention::kAsGiven);
-  EXPECT_NE(describe_pair(evidence).find("exchanged, or if the images of both cameras are mirrored left to right; "),
-            std::string::npos)
+  EXPECT_NE(
+      describe_pair(evidence).find("exchanged, or if the images of both cameras are mirrored left to right, or if "
+                                   "the images of both cameras are rotated by 180 degrees; "),
+      std::string::npos)
       << describe_pair(evidence);
 }
 

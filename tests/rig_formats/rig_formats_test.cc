@@ -180,6 +180,29 @@ TEST_F(RigFormats, WithoutRemovesTheGivenPart) {
   EXPECT_EQ(bare.camera(index(1)).time_offset_ns, 5);
 }
 
+// A refinement of the principal point of camera 0 turns its frame, which then is not the rig frame.
+TEST_F(RigFormats, ExtrinsicsRelativeToATurnedCamera0AreKeptInEveryFormat) {
+  const SE3 T_cam0_rig(geometry::so3_exp({0.01, -0.02, 0}), Vector3d::Zero());
+  const SE3 T_cam0_cam1(geometry::so3_exp({0.1, 0.2, 0.3}), {0.2, 0.01, -0.02});
+  camera::RigCamera first{camera::test_cameras()[1], SE3()}, second{first.camera, T_cam0_cam1};
+  second.camera.name = "second";
+  const camera::Rig rig({first, second}, T_cam0_rig);
+  for (const auto format : {RigFormat::kBslam, RigFormat::kKalibr, RigFormat::kOpenvins, RigFormat::kOrbslam3,
+                            RigFormat::kOkvis2, RigFormat::kBasalt, RigFormat::kColmap, RigFormat::kEuroc}) {
+    const fs::path out = folder_.path() / std::to_string(static_cast<int>(format)) / "rig.yaml";
+    fs::create_directories(out.parent_path());
+    const auto written = write_rig_as(rig, format, out);
+    ASSERT_TRUE(written) << written.error().message();
+    const auto again = read_rig_file(out);
+    ASSERT_TRUE(again) << again.error().message();
+    const SE3 found = again->rig.cam_from_rig(0) * again->rig.rig_from_cam(1);
+    EXPECT_LT((found.matrix() - T_cam0_cam1.matrix()).cwiseAbs().maxCoeff(), 1e-6) << static_cast<int>(format);
+  }
+  const camera::Rig bare = without(rig, Droppable::kBodyFrame);
+  EXPECT_TRUE(bare.body_from_cam(0).matrix().isIdentity(1e-12));
+  EXPECT_TRUE(bare.body_from_cam(1).matrix().isApprox(T_cam0_cam1.matrix(), 1e-12));
+}
+
 // ---- Kalibr and OpenVINS
 
 constexpr const char* kKalibr = R"(cam0:

@@ -145,6 +145,22 @@ TEST(RosPoses, MapAndOdomBeginAtBaseLinkWithTheAxesOfTheRobot) {
   EXPECT_NEAR(other.T_map_odom.translation[0], 5, 1e-12);
 }
 
+TEST(RosPoses, MapBeginsAtBaseLinkAlsoIfARefinementHasTurnedCamera0) {
+  bslam::CameraCalibration camera = calibration();
+  camera.T_body_cam = kBaseCam0;
+  PoseConverter converter(bslam::Rig::make({camera}).value());
+  const bslam::Pose T_base_reported = kBaseCam0 * bslam::Pose{{0, std::sin(0.01), 0, std::cos(0.01)}, {}};
+  bslam::FrameResult frame;
+  frame.status = bslam::TrackingStatus::kTracking;
+  frame.T_world_body = frame.T_odom_body = T_base_reported.inverse();
+  const PoseOutput start = converter.convert(frame);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_NEAR(start.T_map_base.translation[i], 0, 1e-12);
+    EXPECT_NEAR(start.T_map_base.rotation[i], 0, 1e-12);
+    EXPECT_NEAR(start.T_odom_base.rotation[i], 0, 1e-12);
+  }
+}
+
 RawImage image_of(const char* encoding, const std::vector<std::uint8_t>& data, std::size_t width, std::size_t step) {
   RawImage out;
   out.encoding = encoding;

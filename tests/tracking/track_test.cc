@@ -341,6 +341,16 @@ TEST_F(Track, EstimatesTheMotion) {
   EXPECT_LT(map::angle_rad(predicted, next), 0.4 * kDegree);
 }
 
+// Cameras that capture late would be displaced by noise divided by a millisecond.
+TEST_F(Track, KeepsTheMotionForAFrameThatFollowsImmediately) {
+  SimulatedTracker tracker(world());
+  for (int i = 1; i <= 6; ++i) tracker.track(seen(i).frame);
+  const geometry::Vector6d before = tracker.state.twist.value();
+  const TrackOutput out = tracker.track(world().sim.frame(FrameId(7), 0.301).frame);
+  ASSERT_EQ(out.result.status, TrackStatus::kTracking);
+  EXPECT_EQ(out.frame.twist, before);
+}
+
 TEST_F(Track, DoesNotDependOnTheNumberOfThreads) {
   const auto pyramids = map::flat_pyramids(2);
   const std::vector<matching::AlignmentOptions> alignment(pyramids.size());
