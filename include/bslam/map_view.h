@@ -65,6 +65,7 @@ class BSLAM_EXPORT MapView {
   Scale scale() const;
   std::size_t num_keyframes() const;
   std::size_t num_landmarks() const;
+  // The number of observations of landmarks by keypoints: a feature that several cameras see counts once for each.
   std::size_t num_observations() const;
   // All cameras of the map, without masks: those of the first run, then those of other rigs that have continued the
   // map. Calibrations that were refined are those after the refinement; the extrinsics of a camera that was moved
@@ -77,7 +78,7 @@ class BSLAM_EXPORT MapView {
   // if the map was saved without words.
   std::vector<std::vector<std::int32_t>> words() const;
   // Returns the pairs of keyframes with at least `min_landmarks` common landmarks, in order of their ids.
-  // `min_landmarks` must be 1 or more.
+  // Values below 1 have the effect of 1.
   std::vector<CovisibilityEdge> covisibility(int min_landmarks = 15) const;
   std::vector<Submap> submaps() const;  // in order of root id
 

@@ -1,4 +1,5 @@
-// Errors as values. No function of bslam throws, prints or exits because of invalid input; it returns a Result.
+// Errors as values: functions that can fail return a Result or a Status. None of them throws, prints or exits because
+// of invalid input.
 #pragma once
 
 #include <optional>

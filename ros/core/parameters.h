@@ -43,7 +43,9 @@ struct Parameters {
     visit("camera_info_topics", self.camera_info_topics,
           "topics of the calibrations, used without `rig`; default: camera_info beside each image topic");
     visit("rig", self.rig, "calibration file in any format of bslam; empty: from CameraInfo and tf");
-    visit("cameras", self.cameras, "cameras of the rig file that the image topics belong to; default: all");
+    visit("cameras", self.cameras,
+          "indices, from 0, of the cameras of the rig file that the image topics belong to, in their order; default: "
+          "all");
     visit("config", self.config, "settings of bslam, a YAML file as `bslam run` writes it");
     visit("settings", self.settings, "further settings of bslam, each `name=value`");
     visit("map_file", self.map_file, "saved map to continue, or to localise in; empty: a new map");
@@ -64,12 +66,13 @@ struct Parameters {
     visit("max_wait", self.max_wait, "maximum delay of an image relative to images of other cameras, s");
     visit("max_bundles", self.max_bundles, "number of frames that may wait for SLAM before the oldest is dropped");
     visit("queue_size", self.queue_size, "queue of each subscription, messages");
-    visit("significant_bits", self.significant_bits, "of 16-bit images, 8 to 16");
+    visit("significant_bits", self.significant_bits, "number of bits that the values of 16-bit images use, 8 to 16");
     visit("cloud_period", self.cloud_period, "minimum time between point clouds, s");
     visit("cloud_min_observations", self.cloud_min_observations, "minimum number of keyframes that observe a point");
     visit("path_period", self.path_period, "minimum time between paths, s");
     visit("path_max_poses", self.path_max_poses, "maximum number of poses in a path, which are evenly spaced");
-    visit("history_frames", self.history_frames, "number of last frames that path and trajectory contain at least");
+    visit("history_frames", self.history_frames,
+          "path and trajectory contain at least this number of last frames; 0: all");
   }
 
   // Errors name the parameter: no image topic, a value out of range, lists of different lengths, equal frames, a

@@ -19,6 +19,7 @@ struct Rig::Impl {
 
 namespace api {
 
+// `masks`: one per camera, or fewer if the last cameras have none; an empty image for a camera without one.
 Rig make_rig(camera::Rig rig, std::vector<image::Image> masks = {}, std::vector<std::string> notes = {});
 
 }  // namespace api

@@ -1,6 +1,6 @@
 // The camera models that project through a sphere. All share a last stage: a point at height `k` above the centre of
-// a sphere and at distance `d` from it is mapped to m = (x, y) / (alpha d + (1 - alpha) k). Equations: docs/math.md,
-// section 8.
+// a sphere and at distance `d` from it is mapped to m = (x, y) / (alpha d + (1 - alpha) k). The extended unified model
+// has d = sqrt(beta (x^2 + y^2) + z^2) in place of the distance. Equations: docs/math.md, section 8.
 #include <cmath>
 
 #include "base/assert.h"
@@ -21,7 +21,8 @@ std::optional<double> divisor(double alpha, double k, double d) {
   return n > 0 ? std::optional(n) : std::nullopt;
 }
 
-// Returns the height h such that the last stage maps the direction (m_x, m_y, h) to a point m with squared radius r2.
+// Returns the height h such that the last stage maps the direction (m_x, m_y, h) to the point m. `r2`: |m|^2, or
+// beta |m|^2 for the extended unified model.
 std::optional<double> height(double alpha, double r2) {
   const double root2 = 1 - (2 * alpha - 1) * r2;
   if (!(root2 > 0)) return std::nullopt;
@@ -98,7 +99,8 @@ std::optional<Vector3d> ExtendedUnified::unproject(const Vector2d& pixel) const 
   return unproject_ellipsoid(k_, alpha_, beta_, pixel);
 }
 
-// The plane's point is (x, y) / n: its derivative is -(x, y) / n^2 dn.
+// The point on the normalised image plane is (x, y) / n; its derivative with respect to a parameter is -(x, y) / n^2
+// times that of n.
 void Unified::distortion_jacobian(const Vector3d& point, Eigen::Ref<Matrix2Xd> J) const {
   const double d = point.norm(), n = alpha_ * d + (1 - alpha_) * point.z();
   J.col(0) = -(d - point.z()) / (n * n) * point.head<2>();

@@ -74,7 +74,10 @@ std::string mode_text(const VideoMode& mode) {
                       mode.height);
   std::vector<std::string> rates;
   for (const double fps : mode.fps) rates.push_back(fmt::format("{:.4g}", fps));
-  return rates.empty() ? out : fmt::format("{} ({} frames/s)", out, fmt::join(rates, ", "));
+  if (rates.empty()) return out;
+  if (mode.any_between && rates.size() > 1)
+    return fmt::format("{} ({} to {} frames/s)", out, rates.back(), rates.front());
+  return fmt::format("{} ({} frames/s)", out, fmt::join(rates, ", "));
 }
 
 struct Capability {
@@ -82,7 +85,8 @@ struct Capability {
   bool captures = false;
 };
 
-// Opens a device for a moment. The error is text.
+// Opens a device, reads its name and, if `modes` is given, its modes, and closes it. `found` of the error is the
+// message of the operating system.
 Result<Capability> capability(VideoCalls& calls, const std::string& path, std::vector<VideoMode>* modes) {
   const int device = calls.open(path.c_str());
   if (device < 0) return Error{path, "", std::strerror(errno), ""};

@@ -27,7 +27,7 @@ int video_ioctl(VideoCalls& calls, int device, unsigned long request, void* argu
 // All modes of a capture device, in its order.
 std::vector<VideoMode> video_modes(VideoCalls& calls, int device);
 
-// One line: "GREY 752x480 (60, 30 frames/s), MJPG 1280x720 (30 frames/s)".
+// One line: "GREY 752x480 (60, 30 frames/s), MJPG 1280x720 (5 to 30 frames/s)".
 std::string modes_text(const std::vector<VideoMode>& modes);
 
 // Returns the rate of a mode that suits a request best, in frames per second: the one that is asked for, or the highest

@@ -16,6 +16,7 @@ struct ProcessEnd {
   int signal = 0;
 };
 
+// The program that calls run_program(), which starts it again under the name "bslam".
 constexpr const char* kThisProgram = "/proc/self/exe";
 
 // Runs a program, which is looked for in PATH unless its name contains a slash, with the given arguments (without its

@@ -80,8 +80,8 @@ int inspect(const InspectArguments& arguments) {
 
 void add_inspect(CLI::App& app, int& exit_status) {
   const auto a = std::make_shared<InspectArguments>();
-  CLI::App* verb =
-      app.add_subcommand("inspect", "write the BundledFrame of one input frame: its keypoints and the Bundled table");
+  CLI::App* verb = app.add_subcommand(
+      "inspect", "write the keypoints of one input frame, and which of them were matched between cameras, as JSON");
   add_dataset_options(*verb, a->data);
   verb->add_option("--frame", a->frame, "index of the input frame, counted from 0")->required();
   verb->add_option("--out", a->out, "JSON file to write")->required();

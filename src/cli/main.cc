@@ -44,7 +44,7 @@ int run_command(int argc, char** argv) {
     if (e.get_exit_code() == 0) return app.exit(e);  // help and version
     return report_error(command_line_error(app, e));
   } catch (const std::exception& e) {              // for example out of memory; not an error in the request
-    if (std::ferror(stdout) != 0) return kExitOk;  // fmt::print: finish_stdout reports it
+    if (std::ferror(stdout) != 0) return kExitOk;  // fmt::print has failed, which finish_stdout reports
     print_message("bslam: {}\n", e.what());
     return kExitFailed;
   }

@@ -37,8 +37,8 @@ int map_transfer(const TransferArguments& arguments) {
   const Status s =
       evaluation::write_trajectory(arguments.out, moved->poses, evaluation::TrajectoryFormat::kTum, comments);
   if (!s) return report_error(s.error());
-  fmt::print("{} poses, connected by {} keyframes to submap {}\n{}\n", moved->poses.size(), moved->keyframes,
-             moved->submap, arguments.out);
+  fmt::print("{} poses, transformed by {} keyframes that both maps contain, are in the frame {}\n{}\n",
+             moved->poses.size(), moved->keyframes, parent, arguments.out);
   return kExitOk;
 }
 

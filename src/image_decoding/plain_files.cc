@@ -12,7 +12,7 @@ namespace {
 
 bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; }
 
-// Takes the next whole number of the header of a PNM, before which there may be blanks and comments.
+// Takes the next whole number of a PNM, before which there may be blanks and comments.
 std::optional<std::uint32_t> take_number(std::string_view& rest) {
   constexpr std::uint32_t kMost = 1 << 24;
   while (!rest.empty() && (is_blank(rest.front()) || rest.front() == '#'))
@@ -40,7 +40,7 @@ bool read_text_values(std::string_view rest, cv::Mat& image) {
   return true;
 }
 
-// Values of one byte, or of two of which the first is the larger one.
+// Reads values of one byte, or of two bytes in big-endian order.
 bool read_values(std::string_view rest, cv::Mat& image) {
   const std::size_t row = static_cast<std::size_t>(image.cols) * image.elemSize();
   if (rest.size() < row * static_cast<std::size_t>(image.rows)) return false;

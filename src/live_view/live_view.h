@@ -23,7 +23,7 @@ struct Subject {
   const system::Config& config;
   std::string command;                      // the command line
   std::size_t loaded_keyframes = 0;         // keyframe slots of the map that is continued; 0: none
-  std::optional<geometry::UpAxis> up = {};  // what points upward
+  std::optional<geometry::UpAxis> up = {};  // what points upward in the view of the map; none: estimated
 };
 
 class LiveView final : public session::RunObserver {

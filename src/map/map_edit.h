@@ -3,39 +3,42 @@
 // Rebase rules, for the case that other edits were committed between the edit's base version and its own commit.
 // "Newer" means created by those other edits.
 //
-// | operation           | rule                                                                                     | |
-// AddKeyframe         | gets the next id; matches to removed landmarks are dropped, those to merged ones         | |
-// | forwarded; if its parent has moved since the base, the keyframe moves with it; if the    | |                     |
-// submap of its parent was removed, the keyframe becomes the root of a new submap          | | AddLandmark         |
-// gets the next id; observations by removed keyframes or of features that already have a   | |                     |
-// landmark are dropped, and the landmark itself if none are left; if the keyframe of its   | |                     |
-// reference has moved since the base, the landmark moves with it                           | | AddObservation      |
-// forwarded along merges; dropped if the landmark or keyframe was removed, the feature     | |                     |
-// already has a landmark, or the keyframe already observes the landmark                    | | RemoveObservation   |
-// dropped if the observation no longer exists, also because of a merge                     | | RemoveLandmark      |
-// dropped if it was already removed or merged, or if a newer keyframe observes it          | | MergeLandmarks      |
-// both ends are forwarded; dropped if they are already the same or one was removed         | | RemoveKeyframe      |
-// dropped if it was already removed or is a root                                           | | SetPoses            |
-// dropped if a correction was committed since the base (the next adjustment starts from    | |                     |
-// it); entries of removed keyframes and of removed or merged landmarks are dropped; newer  | |                     |
-// keyframes move with their parent (chains of them with the nearest ancestor that is not   | |                     |
-// newer), newer landmarks with the keyframe of their reference; newer keyframes keep their | |                     |
-// uncertainties                                                                            | | SetTwists           |
-// entries of removed keyframes are dropped; translational velocities are multiplied by the | |                     |
-// change of scale at the keyframe since the base                                           | | ScaleSubmap         |
-// also scales newer keyframes and landmarks; dropped if the submap was removed or merged   | | MergeSubmaps        | a
-// removed keyframe is replaced by its nearest alive ancestor; dropped if both are in the | |                     | same
-// submap                                                                              | | RemoveSubmap        | dropped
-// if the submap was already removed or merged                                      | | AddVisibilityCounts | forwarded
-// along merges; entries of removed landmarks are dropped                         | | RefreshLandmarks    | forwarded
-// along merges; entries of removed landmarks are dropped                         | | SetScale            | the last one
-// committed wins                                                              | | SetRig              | the same; newer
-// keyframes get the bearings of the rig                                    | An edit that corrects the map
-// (SetPoses::correction, ScaleSubmap) is rejected as a whole if another correction was committed since its base:
-// applying only part of it, for example merged landmarks and joined submaps without the corrected poses, would break
-// the map. With these rules the final pose of a new keyframe does not depend on whether it is committed before or after
-// a correction of its surroundings. An operation with several entries counts as dropped if all entries are dropped. An
-// operation on something the edit itself added is dropped if that addition was.
+// clang-format off
+// | operation           | rule                                                                                     |
+// | AddKeyframe         | gets the next id; matches to removed landmarks are dropped, those to merged ones         |
+// |                     | forwarded; if its parent has moved since the base, the keyframe moves with it; if the    |
+// |                     | submap of its parent was removed, the keyframe becomes the root of a new submap          |
+// | AddLandmark         | gets the next id; observations by removed keyframes or of features that already have a   |
+// |                     | landmark are dropped, and the landmark itself if none are left; if the keyframe of its   |
+// |                     | reference has moved since the base, the landmark moves with it                           |
+// | AddObservation      | forwarded along merges; dropped if the landmark or keyframe was removed, the feature     |
+// |                     | already has a landmark, or the keyframe already observes the landmark                    |
+// | RemoveObservation   | dropped if the observation no longer exists, also because of a merge                     |
+// | RemoveLandmark      | dropped if it was already removed or merged, or if a newer keyframe observes it          |
+// | MergeLandmarks      | both ends are forwarded; dropped if they are already the same or one was removed         |
+// | RemoveKeyframe      | dropped if it was already removed or is a root                                           |
+// | SetPoses            | dropped if a correction was committed since the base (the next adjustment starts from    |
+// |                     | it); entries of removed keyframes and of removed or merged landmarks are dropped; newer  |
+// |                     | keyframes move with their parent (chains of them with the nearest ancestor that is not   |
+// |                     | newer), newer landmarks with the keyframe of their reference; newer keyframes keep their |
+// |                     | uncertainties                                                                            |
+// | SetTwists           | entries of removed keyframes are dropped; translational velocities are multiplied by the |
+// |                     | change of scale at the keyframe since the base                                           |
+// | ScaleSubmap         | also scales newer keyframes and landmarks; dropped if the submap was removed or merged   |
+// | MergeSubmaps        | a removed keyframe is replaced by its nearest alive ancestor; dropped if both are in the |
+// |                     | same submap                                                                              |
+// | RemoveSubmap        | dropped if the submap was already removed or merged                                      |
+// | AddVisibilityCounts | forwarded along merges; entries of removed landmarks are dropped                         |
+// | RefreshLandmarks    | forwarded along merges; entries of removed landmarks are dropped                         |
+// | SetScale            | the last one committed wins                                                              |
+// | SetRig              | the last one committed wins; newer keyframes get the bearings of the rig                 |
+// clang-format on
+//
+// An edit that corrects the map (SetPoses::correction, ScaleSubmap) is rejected as a whole if another correction was
+// committed since its base: applying only part of it, for example merged landmarks and joined submaps without the
+// corrected poses, would break the map. With these rules the final pose of a new keyframe does not depend on whether it
+// is committed before or after a correction of its surroundings. An operation with several entries counts as dropped if
+// all entries are dropped. An operation on something the edit itself added is dropped if that addition was.
 #pragma once
 
 #include <memory>

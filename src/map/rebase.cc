@@ -93,7 +93,8 @@ class Rebase {
   bool newer(KeyframeId k) const { return k.index() >= base_.keyframe_slots() && k.index() < others_keyframes_end_; }
 
   Motion motion_since_base(KeyframeId edit_id) const;
-  // Returns the changes of scale about the keyframes that it moved.
+  // Moves newer keyframes and landmarks with the keyframes in `motions`. Returns the factors by which lengths about the
+  // newer keyframes change.
   std::vector<std::pair<KeyframeId, double>> move_newer(const std::unordered_map<KeyframeId, Motion>& motions);
 
   const BundledMap& base_;
@@ -162,7 +163,7 @@ bool Rebase::operator()(const RemoveLandmark& op) {
 bool Rebase::operator()(const SetPoses& op) {
   if (!same_epoch_) return false;
   bool any = false;
-  std::unordered_map<KeyframeId, double> scale_changes;  // keyed by ids of the map, as the next
+  std::unordered_map<KeyframeId, double> scale_changes;  // by id of the map, like `motions`
   for (const auto& [edit_id, factor] : op.scale_changes) scale_changes[map_id(edit_id)] = factor;
   std::unordered_map<KeyframeId, Motion> motions;
   for (const auto& [edit_id, T_rig_world] : op.keyframes) {

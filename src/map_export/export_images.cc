@@ -1,4 +1,4 @@
-// Exports of poses with images: COLMAP, nerfstudio, and the folder of all.
+// Exports of poses with images: COLMAP, nerfstudio, and the folder of points, keyframes, rig and COLMAP model.
 #include <fmt/format.h>
 
 #include "base/interrupted.h"
@@ -45,15 +45,16 @@ Status write_keyframes(Exporter& exporter, const AtomicFolder& folder) {
   return {};
 }
 
-// The path without links in the folders of a file, which may itself be a link.
+// The absolute path of a file, without symbolic links in its folders; the file itself may be a link.
 fs::path without_links(const fs::path& file) {
   std::error_code error;
   const fs::path absolute = fs::absolute(file), folder = fs::weakly_canonical(absolute.parent_path(), error);
   return (error ? absolute.parent_path() : folder) / absolute.filename();
 }
 
-// file_path of every image: undistorted ones are in the folder, recorded ones are reached from it, or from the folder
-// that it leads to if it is a link.
+// file_path of every image: images/NAME if it is undistorted, is not a file of its own, or is not in the recording;
+// otherwise the path of the recorded file relative to the folder of the export, or, if that is a link, to the folder
+// that it leads to.
 std::vector<std::string> nerfstudio_paths(const Exporter& exporter) {
   std::vector<std::string> paths;
   const fs::path out = without_links(exporter.request.out / "transforms.json").parent_path();
@@ -66,14 +67,15 @@ std::vector<std::string> nerfstudio_paths(const Exporter& exporter) {
   return paths;
 }
 
-// Writes rig.yaml. The masks themselves are not exported, nor are moves of cameras.
+// Writes rig.yaml: without masks, and with the extrinsics before the first move of a camera.
 Status write_rig(Exporter& exporter, const camera::Rig& rig, const AtomicFolder& folder) {
   if (!exporter.map().rig().moves().empty())
     exporter.note("a camera was moved during the recording; rig.yaml has its extrinsics before that");
   return folder.write("rig.yaml", rig_formats::rig_to_yaml(rig_formats::without(rig, rig_formats::Droppable::kMasks)));
 }
 
-// The undistorted image as the bytes of a PNG file; nullopt if the recorded one cannot be read.
+// The undistorted image as the bytes of a PNG file; nullopt if there is no recorded image, it cannot be read, or its
+// size differs from the camera's.
 std::optional<std::string> undistorted_png(Exporter& exporter, const MapImage& image) {
   if (!image.recorded) return std::nullopt;
   const camera::Camera& camera = exporter.map().rig().camera(image.camera);

@@ -147,8 +147,8 @@ class AlignedPositions {
   }
 
   // Sets the aligned position of the edge's second keypoint. The first one defines the feature, so that its position is
-  // exact. An edge whose first keypoint is aligned to another keypoint is ignored, because it refers to the old
-  // position.
+  // exact. An edge is ignored if its first keypoint is aligned to another one, because it refers to the old position,
+  // or if its second keypoint is already aligned or is the reference of another keypoint.
   void align(const Edge& edge, std::span<const image::Pyramid> pyramids, std::span<const AlignmentOptions> alignment) {
     if (role(edge.a) == kAligned || role(edge.b) != kDetected) return;
     role(edge.a) = kReference;
@@ -203,7 +203,7 @@ bool agrees_at_infinity(std::span<const PointObservation> group, double max_chi2
 }
 
 // Removes the keypoint with the largest error until the rest agrees with one point. Returns false if fewer than two
-// remain.
+// remain, or if no point can be estimated from the rest and its directions differ.
 bool keep_agreeing(const camera::Rig& rig, const AlignedPositions& positions, double max_chi2,
                    std::vector<frame::KeypointRef>& group) {
   while (group.size() >= 2) {

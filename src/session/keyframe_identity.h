@@ -7,9 +7,10 @@
 
 namespace bslam::session {
 
-// A hash of the keypoints of a keyframe: equal for the same keyframe in different maps, with any number of merges and
-// further runs between them. The positions of keypoints are those that its run has refined, so that keyframes that
-// other runs made from the same images are others, except for the first ones of runs that begin alike.
+// A hash of the descriptors and positions of the keypoints of a keyframe: equal for the same keyframe in different
+// maps, with any number of merges and further runs between them. Keyframes that other runs made from the same images
+// have other hashes, since each run refines the positions of its keypoints; only runs that begin alike have equal first
+// ones.
 std::uint64_t identity_of(const map::BundledKeyframe& keyframe);
 
 }  // namespace bslam::session

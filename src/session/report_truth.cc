@@ -29,7 +29,7 @@ std::optional<geometry::SE3> camera_in_truth_frame(const dataset::Dataset& datas
   return dataset.whole_rig->rig_from_cam(used);
 }
 
-// The true poses of camera 0 while the recording was processed.
+// The true poses of camera 0 from the first to the last frame that was processed, with a margin of `tolerance_ns`.
 Trajectory truth_of_camera(const Trajectory& truth, const dataset::Dataset& dataset, const geometry::SE3& T_truth_cam0,
                            TimeNs tolerance_ns) {
   Trajectory kept;

@@ -10,7 +10,7 @@ namespace bslam::session {
 struct TransferredTrajectory {
   evaluation::Trajectory poses;
   std::size_t submap = 0;     // index among the submaps of `merged`
-  std::size_t keyframes = 0;  // keyframes of the run that connect both maps
+  std::size_t keyframes = 0;  // number of keyframes of the run that both maps contain
 };
 
 // Moves each pose by the transforms of the keyframes before and after it between the two maps. Keyframes are identified

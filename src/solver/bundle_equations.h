@@ -1,6 +1,5 @@
 // Bundle adjustment as a least-squares problem (solver/lm.h): poses, points and the parameters of the rig, with the
-// points eliminated by the Schur complement (docs/math.md, section 5). Used by all bundle adjustments of this
-// folder.
+// points eliminated by the Schur complement (docs/math.md, section 5). Used by the bundle adjustments of all folders.
 #pragma once
 
 #include <optional>

@@ -1,4 +1,4 @@
-// Levenberg-Marquardt algorithm, used by all optimisations of this folder (docs/math.md, section 3).
+// Levenberg-Marquardt algorithm, used by the optimisations of all folders (docs/math.md, section 3).
 #pragma once
 
 #include <Eigen/Cholesky>

@@ -54,8 +54,8 @@ class RigBlock {
   virtual void add_prior(const RigValues&, Eigen::Ref<Eigen::MatrixXd>, Eigen::Ref<Eigen::VectorXd>) const {}
 };
 
-using RigBlocks =
-    std::vector<std::unique_ptr<RigBlock>>;  // blocks of one adjustment; each must change different values
+// Blocks of one adjustment. If they are applied, each must change different values.
+using RigBlocks = std::vector<std::unique_ptr<RigBlock>>;
 
 // Prior for the extrinsics of all cameras but the first: normal distributions around the calibrated values, and one of
 // the common scale of all baselines, the root of sum |c|^2 / sum |c'|^2 with the estimated and calibrated camera

@@ -38,7 +38,8 @@ feature::Patch random_patch(Random& random) {
   return patch;
 }
 
-// Returns a landmark on one of the six sides of the room, uniformly distributed over their area.
+// Returns a landmark near one of the six sides of the room, at most `scatter` inside; the sides are drawn in proportion
+// to their areas.
 SimulatedLandmark random_landmark(const FeatureSimulatorOptions& o, Random& random) {
   const Vector3d size = o.room_high - o.room_low;
   const std::array<double, 3> area = {size.y() * size.z(), size.x() * size.z(), size.x() * size.y()};

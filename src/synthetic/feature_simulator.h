@@ -27,8 +27,9 @@ struct FeatureSimulatorOptions {
   int landmarks = 8000;
   double nearest_base = 4.0, farthest_base = 14.0;  // metres: distance at which a landmark is detected on level 0
 
-  int max_keypoints = 1000;  // maximum number of inlier keypoints per camera; the strongest landmarks are kept
-  double sigma_px = 0.7;     // standard deviation of a keypoint, in pixels of its level
+  // maximum number of inlier keypoints per camera; those of the first landmarks by index are kept
+  int max_keypoints = 1000;
+  double sigma_px = 0.7;  // standard deviation of a keypoint, in pixels of its level
   int levels = 8;
   double scale_factor = 1.2;
   double detection_share = 0.85;  // fraction of visible landmarks that are detected

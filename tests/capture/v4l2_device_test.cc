@@ -235,6 +235,17 @@ TEST_F(V4l2, ListsTheDevices) {
       "read\n/dev/video1: test camera (delivers no images)\n/dev/video2: Permission denied\n");
 }
 
+TEST(VideoModes, ARangeOfRatesIsTold) {
+  const VideoMode mode{.pixels = V4L2_PIX_FMT_GREY,
+                       .width = 8,
+                       .height = 4,
+                       .min_width = 8,
+                       .min_height = 4,
+                       .fps = {120, 7.5},
+                       .any_between = true};
+  EXPECT_EQ(modes_text({mode}), "GREY 8x4 (7.5 to 120 frames/s)");
+}
+
 // ---- Pixels
 
 std::string ramp(int count, int from = 0) {

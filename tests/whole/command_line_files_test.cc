@@ -147,6 +147,10 @@ TEST_F(CommandLine, AnExportDoesNotReplaceItsMap) {
   EXPECT_NE(run(onto_itself).err.find("found a file that this command reads"), std::string::npos);
   expect_rejected("map transfer " + out("exported_map/trajectory.tum") + " --from " + map + " --to " + map +
                   " --overwrite --out " + map);
+  const Ran moved = run("map transfer " + out("exported_map/trajectory.tum") + " --from " + map + " --to " + map +
+                        " --out " + out("moved.tum"));
+  EXPECT_NE(moved.out.find(" keyframes that both maps contain, are in the frame world\n"), std::string::npos)
+      << moved.out << moved.err;
   EXPECT_EQ(read_text(map), bytes);
   EXPECT_EQ(read_text(out("poem.ply")), "precious");
   summary_of("exported_map", "--cameras 0,1 --end 0.5 --overwrite --save-map " + linked);
