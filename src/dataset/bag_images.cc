@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "base/max_image_side.h"
+#include "dataset/image_names.h"
 #include "image_decoding/image_file.h"
 #include "image_files/image_size.h"
 
@@ -94,6 +95,7 @@ std::vector<ImageTopic> BagStore::find_images() {
     describe_first(topic);
     out.push_back(std::move(topic));
   }
+  std::ranges::stable_sort(out, naturally_before, &ImageTopic::name);
   return out;
 }
 
