@@ -37,7 +37,8 @@ class BagStore : public image_files::ImageStore {
   explicit BagStore(std::vector<std::unique_ptr<containers::MessageFile>> files) : files_(std::move(files)) {}
 
   const std::vector<std::unique_ptr<containers::MessageFile>>& files() const { return files_; }
-  // Reads the beginning of every image message, and keeps where they are. Called once.
+  // Reads the beginning of every image message, and keeps where they are. Called once. Returns the topics in the
+  // natural order of their names.
   std::vector<ImageTopic> find_images();
 
   Result<image_files::StoredImage> read(std::int64_t entry) const override;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <string_view>
 #include <system_error>
 
 #include "base/atomic_file.h"
@@ -50,6 +51,18 @@ Result<std::vector<std::string>> listed_files(const fs::path& metadata) {
   return names;
 }
 
+// The file of a bag that metadata.yaml lists. Only its name is used, since old versions of rosbag2 wrote absolute paths
+// on the recording machine. Recorders that compress whole files list the compressed ones; a decompressed one is
+// preferred.
+fs::path file_in(const fs::path& folder, const std::string& name) {
+  constexpr std::string_view kCompressed = ".zstd";
+  const fs::path file = folder / fs::path(name).filename();
+  if (!name.ends_with(kCompressed)) return file;
+  const fs::path plain = folder / file.stem();
+  std::error_code error;
+  return fs::is_regular_file(plain, error) ? plain : file;
+}
+
 }  // namespace
 
 Result<BagFiles> files_of_rosbag2(const fs::path& folder) {
@@ -64,8 +77,7 @@ Result<BagFiles> files_of_rosbag2(const fs::path& folder) {
     out.files = present;
   } else {
     for (const std::string& name : *names) {
-      // Only files of the folder: old versions wrote paths of the machine that recorded.
-      const fs::path file = folder / fs::path(name).filename();
+      const fs::path file = file_in(folder, name);
       if (fs::is_regular_file(file, error)) {
         if (std::ranges::find(out.files, file) == out.files.end()) out.files.push_back(file);
       } else {

@@ -28,14 +28,18 @@ Result<image::Image> read_image(const std::filesystem::path& file, const PixelFo
 // The same from a file or a recording.
 Result<image::Image> read_image(const image_files::ImageFile& image, const PixelFormat& format = {});
 
-// Decodes an image of a recording. The colour filter of its layout takes precedence over that of `format`. Returns
-// nullopt if it is incomplete or damaged.
+// Decodes an image of a recording. The colour filter of its layout, or of a file with one channel, takes precedence
+// over that of `format`. Returns nullopt if it is incomplete or damaged.
 std::optional<image::Image> decode_stored(const image_files::StoredImage& image, const PixelFormat& format = {});
 
 // Returns the number of bits in use in the 16-bit images of a camera: the smallest of 8, 10, 12, 14 and 16 that holds
 // all values of a few readable images spread over the list. Returns 16 if one of them has 8 bits, since such a camera
 // has no common number of bits.
 int bits_in_use(std::span<const image_files::ImageFile> images);
+
+// Reads a mask, which is 0 where the file has the value 0 or the colour black, whatever its number of bits.
+// FILE.mcap/NAME is an attachment of an MCAP file. Errors as read_image; no such attachment.
+Result<image::Image> read_mask_file(const std::filesystem::path& file);
 
 // Reads the mask of a camera, in which 0 marks pixels to ignore; an empty image if the camera has none. Errors: the
 // file cannot be read, differs from the resolution of the camera, or is 0 everywhere.

@@ -220,7 +220,12 @@ bool read_strip(const TiffBytes& in, const TiffImage& image, std::size_t strip, 
 
 }  // namespace
 
-cv::Mat decode_tiff(std::string_view bytes) {
+bool tiff_has_colours(std::string_view bytes) {
+  const auto image = read_fields({bytes, bytes.front() == 'M'});
+  return image && image->samples >= 3;
+}
+
+cv::Mat decode_tiff(std::string_view bytes, OfColours kept) {
   const TiffBytes in{bytes, bytes.front() == 'M'};
   const auto image = read_fields(in);
   if (!image) return {};
@@ -232,7 +237,7 @@ cv::Mat decode_tiff(std::string_view bytes) {
   if (image->samples == 2) cv::extractChannel(out, out, 0);
   if (image->samples >= 3) cv::cvtColor(out, out, image->samples == 3 ? cv::COLOR_RGB2BGR : cv::COLOR_RGBA2BGRA);
   if (image->photometric == 0) cv::bitwise_not(out, out);
-  return brightness(out);
+  return one_channel(out, kept);
 }
 
 }  // namespace bslam::image_decoding

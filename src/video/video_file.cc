@@ -37,7 +37,8 @@ class Decoder {
 
   // Returns a description of the problem; empty if there is none.
   std::string open(const std::string& path);
-  // Returns the presentation time of the next packet of the video, without decoding it; nullopt at the end.
+  // Returns the presentation time of the next packet of the video, without decoding it; nullopt at the end. Packets
+  // that an edit list hides are skipped, since the decoder does not return their images.
   std::optional<std::int64_t> next_time();
   // Continues at or before a time, or at the beginning.
   bool seek(std::int64_t time) {
@@ -109,7 +110,7 @@ std::string Decoder::open(const std::string& path) {
 
 std::optional<std::int64_t> Decoder::next_time() {
   while (f_.av_read_frame(format_, packet_) >= 0) {
-    const bool ours = packet_->stream_index == stream_;
+    const bool ours = packet_->stream_index == stream_ && (packet_->flags & AV_PKT_FLAG_DISCARD) == 0;
     const std::int64_t time = packet_->pts != AV_NOPTS_VALUE ? packet_->pts : packet_->dts;
     f_.av_packet_unref(packet_);
     if (ours) return time;

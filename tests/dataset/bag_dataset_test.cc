@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
 
 #include "dataset/camera_info.h"
 #include "dataset/dataset.h"
@@ -138,6 +140,26 @@ TEST_F(SmallBag, Ros2IsReadAsTheFolder) {
   EXPECT_TRUE(has(rest->warnings, "ros2_0.db3 is listed but not there"));
 }
 
+// Recorders that compress whole files list them with the extension .zstd, which `zstd -d` removes.
+TEST_F(SmallBag, DecompressedFilesOfRos2AreFound) {
+  const auto all = messages(Wire::kCdr);
+  const fs::path folder = folder_.path() / "walk", file = folder / "walk_0.db3", packed = folder / "walk_0.db3.zstd";
+  fs::create_directories(folder);
+  support::write_sqlite_bag(file, all);
+  support::write_text(folder / "metadata.yaml",
+                      "rosbag2_bagfile_information:\n  compression_format: zstd\n  compression_mode: FILE\n"
+                      "  relative_file_paths:\n    - walk_0.db3.zstd\n");
+  for (const bool beside : {false, true}) {
+    if (beside) support::write_text(packed, support::compress("zstd", support::read_text(file)));
+    expect_same(request(folder));
+    EXPECT_TRUE(open_dataset(request(folder))->warnings.empty()) << open_dataset(request(folder))->warnings.front();
+  }
+  fs::remove(file);
+  const auto not_yet = open_dataset(request(folder));
+  ASSERT_FALSE(not_yet);
+  EXPECT_EQ(not_yet.error().file, packed.string());
+}
+
 TEST_F(SmallBag, FoxgloveIsReadAsTheFolder) {
   std::vector<TestMessage> all = messages(Wire::kProtobuf);
   for (TestMessage& message : all) message.type = "foxglove.RawImage";
@@ -184,6 +206,78 @@ TEST_F(SmallBag, TopicsAreTheCamerasInTheirOrder) {
   DatasetRequest folder = request(data());
   folder.topics = {topic(0)};
   EXPECT_EQ(open_dataset(folder).error().file, "--topics");
+}
+
+// A rig of two cameras, whose names are given.
+std::string rig_of(const std::string& first, const std::string& second) {
+  std::string rig = "bslam_rig: 1\ncameras:\n";
+  for (const std::string& name : {first, second}) {
+    rig += "  - name: " + name +
+           "\n    model: pinhole\n    resolution: [32, 24]\n    intrinsics: [20, 20, 15.5, 11.5]\n"
+           "    T_body_cam: [[1, 0, 0, " +
+           (name == first ? "0" : "0.1") + "], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n";
+  }
+  return rig;
+}
+
+// A colour camera and a pair of infrared cameras, of which a rig has two.
+TEST_F(SmallBag, MoreTopicsThanCamerasAreAskedAbout) {
+  const std::string colour = "/camera/color/image_raw", left = "/camera/infra1/image_rect_raw",
+                    right = "/camera/infra2/image_rect_raw";
+  std::vector<TestMessage> all;
+  for (int k = 0; k < support::kSmallFrames; ++k) {
+    int c = 0;
+    for (const std::string& name : {colour, left, right}) {
+      support::TestImage one = image(c > 0 ? c - 1 : 0, k);
+      if (c++ == 0) one.data[0] = static_cast<char>(one.data[0] + 1);
+      all.push_back({name, "sensor_msgs/Image", one.stamp_ns, support::image_message(Wire::kRos1, one)});
+    }
+  }
+  write(all);
+  const fs::path rig = folder_.path() / "rig.yaml";
+  support::write_text(rig, rig_of("left", "right"));
+  DatasetRequest request{.path = bag(), .rig_file = rig};
+  const std::string expected = bag().string() + ": found image topics " + colour + ", " + left + ", " + right +
+                               ", expected those of the 2 cameras of " + rig.string() +
+                               " (left, right): name the topics in their order with --topics";
+  const auto unclear = open_dataset(request);
+  ASSERT_FALSE(unclear);
+  EXPECT_EQ(unclear.error().message(), expected);
+  EXPECT_EQ(describe_recording(request)->refusal, expected);
+  request.cameras = {0};
+  EXPECT_FALSE(open_dataset(request));
+  request.cameras = {};
+  request.topics = {left, right};
+  const auto named = open_dataset(request);
+  ASSERT_TRUE(named) << named.error().message();
+  EXPECT_EQ(named->sources, (std::vector<std::string>{left, right}));
+}
+
+TEST_F(SmallBag, TopicsWithTheNamesOfTheCamerasAreFoundByThem) {
+  std::vector<TestMessage> all = messages(Wire::kRos1);
+  for (int k = 0; k < support::kSmallFrames; ++k) {
+    support::TestImage one = image(0, k);
+    one.data[0] = static_cast<char>(one.data[0] + 1);
+    all.push_back({"/cam/image_raw", "sensor_msgs/Image", one.stamp_ns, support::image_message(Wire::kRos1, one)});
+  }
+  write(all);
+  const fs::path rig = folder_.path() / "rig.yaml";
+  support::write_text(rig, rig_of("cam1", "cam0"));
+  const auto dataset = open_dataset({.path = bag(), .rig_file = rig});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(dataset->sources, (std::vector<std::string>{topic(1), topic(0)}));
+  EXPECT_TRUE(dataset->sources_by_name);
+  EXPECT_TRUE(has(dataset->warnings, "the additional cameras are not used"));
+}
+
+TEST_F(SmallBag, TopicsAreInTheNaturalOrderOfTheirNames) {
+  std::vector<TestMessage> all = messages(Wire::kRos1);
+  for (TestMessage& message : all)
+    message.topic = message.topic == topic(0) ? "/stereo9/image_raw" : "/stereo10/image_raw";
+  write(all);
+  expect_same(request(bag()));
+  EXPECT_EQ(open_dataset(request(bag()))->sources,
+            (std::vector<std::string>{"/stereo9/image_raw", "/stereo10/image_raw"}));
 }
 
 TEST_F(SmallBag, CameraInfoOfAStereoPairIsItsCalibration) {
@@ -293,6 +387,27 @@ TEST_F(SmallBag, WithoutStampsTheTimesOfRecordingAreUsed) {
   EXPECT_EQ(dataset->first_time_ns, support::kSmallStart + 3'000'000);
 }
 
+// Writers of protocol buffers leave out what is not set.
+TEST_F(SmallBag, WithoutStampsFoxgloveHasTheTimesOfRecording) {
+  auto all = messages(Wire::kProtobuf);
+  const fs::path file = folder_.path() / "a.mcap";
+  for (TestMessage& message : all) {
+    message.type = "foxglove.RawImage";
+    message.bytes.erase(0, 2 + static_cast<std::size_t>(message.bytes[1]));  // field 1, the first
+  }
+  support::write_text(file, support::mcap_bytes(all, Wire::kProtobuf));
+  const auto dataset = open_dataset(request(file));
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(dataset->frames.size(), static_cast<std::size_t>(support::kSmallFrames));
+  EXPECT_TRUE(has(dataset->warnings, "the times of recording are used"));
+  EXPECT_FALSE(has(dataset->warnings, "damaged"));
+  EXPECT_EQ(dataset->first_time_ns, support::kSmallStart + 3'000'000);
+  EXPECT_EQ(read_frame(*dataset, 3).images[1].image.row(0)[5], static_cast<std::uint8_t>(pixels(1, 3)[5]));
+  all[4].bytes.resize(all[4].bytes.size() / 2);
+  support::write_text(file, support::mcap_bytes(all, Wire::kProtobuf));
+  EXPECT_TRUE(has(open_dataset(request(file))->warnings, "1 messages are damaged"));
+}
+
 TEST_F(SmallBag, ImagesWithoutAStampAreNeitherUsedNorDescribed) {
   auto all = messages(Wire::kRos1);
   support::TestImage one = image(0, 2);
@@ -347,14 +462,17 @@ TEST_F(SmallBag, TheDescriptionNamesCamerasTimesAndWhatIsMissing) {
   EXPECT_TRUE(folder->missing.empty());
 }
 
-// An image of one encoding, decoded.
+// An image of one encoding, decoded; a compressed one if `step` is 0.
 image::Image decoded(const std::string& encoding, const std::string& data, int step, bool big_endian = false) {
   const support::TemporaryFolder folder;
   std::vector<TestMessage> all;
   for (int k = 0; k < 3; ++k) {
     const TimeNs time_ns = 1'000'000'000 + k * 100'000'000;
     const support::TestImage one{time_ns, 4, 4, static_cast<std::uint32_t>(step), encoding, data, big_endian};
-    all.push_back({"/image", "sensor_msgs/Image", time_ns, support::image_message(Wire::kCdr, one)});
+    if (step == 0)
+      all.push_back({"/image", "sensor_msgs/CompressedImage", time_ns, compressed_image_message(Wire::kCdr, one)});
+    else
+      all.push_back({"/image", "sensor_msgs/Image", time_ns, support::image_message(Wire::kCdr, one)});
   }
   support::write_text(folder.path() / "a.mcap", support::mcap_bytes(all, Wire::kCdr));
   support::write_text(
@@ -397,6 +515,37 @@ TEST(BagImages, DecodesAllEncodings) {
   EXPECT_EQ(decoded("yuv422_yuy2", pairs, 8).row(1)[1], 11);
   EXPECT_EQ(decoded("bayer_rggb8", rows(4, [](int, int) { return 90; }), 4).row(2)[2], 90);
   EXPECT_EQ(decoded("bayer_gbrg16", rows(8, [](int, int) { return 0x50; }), 8).row(2)[2], 0x50);
+}
+
+// Files of one channel contain the pixels behind the filter, of which a format tells the kind.
+TEST(BagImages, InterpolatesTheColourFilterOfCompressedImages) {
+  constexpr int kRed = 200, kGreen = 100, kBlue = 40;
+  const auto file = [](const cv::Mat& pixels, const std::string& extension) {
+    std::vector<std::uint8_t> bytes;
+    cv::imencode(extension, pixels, bytes);
+    return std::string(bytes.begin(), bytes.end());
+  };
+  const double grey = 0.299 * kRed + 0.587 * kGreen + 0.114 * kBlue;
+  cv::Mat raw(4, 4, CV_8UC1);
+  for (int y = 0; y < 4; ++y) {
+    for (int x = 0; x < 4; ++x) {
+      const int rggb = y % 2 == x % 2 ? (x % 2 == 0 ? kRed : kBlue) : kGreen;
+      raw.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(rggb);
+    }
+  }
+  const std::string png = file(raw, ".png"), colours = file(cv::Mat(4, 4, CV_8UC3, cv::Scalar(90, 90, 90)), ".png");
+  for (const char* format : {"bayer_rggb8; png compressed ", "bayer_rggb8; png compressed bayer_rggb8"}) {
+    for (const auto& [x, y] : {std::pair(1, 1), {2, 1}, {1, 2}, {2, 2}})
+      EXPECT_NEAR(decoded(format, png, 0).row(y)[x], grey, 1.5) << format << ", " << x << " " << y;
+  }
+  EXPECT_NEAR(decoded("bayer_rggb8; tiff compressed ", file(raw, ".tiff"), 0).row(1)[1], grey, 1.5);
+  EXPECT_NEAR(decoded("bayer_rggb8; jpeg compressed ", file(cv::Mat(4, 4, CV_8UC1, 90), ".jpg"), 0).row(1)[1], 90, 1);
+  EXPECT_NEAR(decoded("bayer_bggr8; png compressed ", png, 0).row(1)[1], 0.299 * kBlue + 0.587 * kGreen + 0.114 * kRed,
+              1.5);
+  for (const char* format : {"mono8; png compressed ", "png", "bayer_rggb8; png compressed mono8"})
+    EXPECT_EQ(decoded(format, png, 0).row(1)[1], kBlue) << format;
+  for (const char* format : {"bayer_rggb8; png compressed bgr8", "bayer_rggb8; png compressed "})
+    EXPECT_EQ(decoded(format, colours, 0).row(1)[1], 90) << format;
 }
 
 TEST(CameraInfo, ChecksWhatItCannotRepresent) {

@@ -1,5 +1,10 @@
 #include <gtest/gtest.h>
 
+#include <cstdint>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <vector>
+
 #include "dataset/dataset.h"
 #include "dataset/frame_reader.h"
 #include "dataset/recording_description.h"
@@ -15,6 +20,56 @@ using image::ImageState;
 constexpr int kWidth = 32, kHeight = 24, kFrames = 30;
 
 int value(int camera, int frame, int x, int y) { return (7 * frame + 3 * x + 5 * y + 100 * camera) % 256; }
+
+std::string big_endian(std::initializer_list<std::uint32_t> values, int bytes = 4) {
+  std::string out;
+  for (const std::uint32_t value : values) {
+    for (int k = bytes - 1; k >= 0; --k) out += static_cast<char>(value >> 8 * k);
+  }
+  return out;
+}
+
+std::string atom(const std::string& name, const std::string& content) {
+  return big_endian({static_cast<std::uint32_t>(content.size() + 8)}) + name + content;
+}
+
+// A table of an atom: version and flags, the number of entries, and the entries.
+std::string table(const std::string& name, std::uint32_t count, std::initializer_list<std::uint32_t> entries) {
+  return atom(name, big_endian({0, count}) + big_endian(entries));
+}
+
+// A QuickTime video of 20 images per second, of which an edit list hides the first `hidden`, as tools do that cut
+// videos without encoding them again: only the first image is a key frame. Image k has the grey value 8 k.
+std::string trimmed_video(std::uint32_t hidden) {
+  constexpr std::uint32_t kCount = kFrames, kUnit = 1000, kInterval = 50;
+  std::string media;
+  std::string sizes = big_endian({0, 0, kCount});
+  for (int k = 0; k < kFrames; ++k) {
+    std::vector<std::uint8_t> jpeg;
+    cv::imencode(".jpg", cv::Mat(kHeight, kWidth, CV_8UC1, cv::Scalar(8 * k)), jpeg);
+    sizes += big_endian({static_cast<std::uint32_t>(jpeg.size())});
+    media.append(jpeg.begin(), jpeg.end());
+  }
+  const std::string type = atom("ftyp", "qt  " + big_endian({0}) + "qt  ");
+  const std::uint32_t shown = (kCount - hidden) * kInterval, begin = static_cast<std::uint32_t>(type.size()) + 8;
+  const std::string matrix = big_endian({0x10000, 0, 0, 0, 0x10000, 0, 0, 0, 0x40000000});
+  const std::string entry = atom("jpeg", big_endian({0, 1, 0, 0, 0, 0, kWidth << 16 | kHeight, 72 << 16, 72 << 16, 0}) +
+                                             big_endian({1}, 2) + std::string(32, '\0') + big_endian({24, 0xffff}, 2));
+  const std::string tables = atom("stsd", big_endian({0, 1}) + entry) + table("stts", 1, {kCount, kInterval}) +
+                             table("stss", 1, {1}) + table("stsc", 1, {1, kCount, 1}) + atom("stsz", sizes) +
+                             table("stco", 1, {begin});
+  const std::string handler = atom("hdlr", big_endian({0}) + "mhlrvide" + std::string(13, '\0'));
+  const std::string references = atom("dinf", atom("dref", big_endian({0, 1}) + atom("url ", big_endian({1}))));
+  const std::string minf = atom("minf", atom("vmhd", big_endian({1, 0, 0})) + references + atom("stbl", tables));
+  const std::string mdia =
+      atom("mdia", atom("mdhd", big_endian({0, 0, 0, kUnit, kCount * kInterval, 0})) + handler + minf);
+  const std::string track = atom(
+      "tkhd", big_endian({15, 0, 0, 1, 0, shown, 0, 0, 0, 0}) + matrix + big_endian({kWidth << 16, kHeight << 16}));
+  const std::string edits = atom("edts", table("elst", 1, {shown, hidden * kInterval, 0x10000}));
+  const std::string movie = atom("mvhd", big_endian({0, 0, 0, kUnit, shown, 0x10000, 0x1000000, 0, 0}) + matrix +
+                                             std::string(24, '\0') + big_endian({2}));
+  return type + atom("mdat", media) + atom("moov", movie + atom("trak", track + edits + mdia));
+}
 
 // Uncompressed grey videos of 20 images per second, in the format YUV4MPEG2.
 class Videos : public testing::Test {
@@ -94,6 +149,24 @@ TEST_F(Videos, OtherLengthsAreAWarning) {
   ASSERT_FALSE(dataset->warnings.empty());
   EXPECT_NE(dataset->warnings[0].find("has 20 images but"), std::string::npos) << dataset->warnings[0];
   EXPECT_EQ(read_frame(*dataset, 25).images[1].state, ImageState::kMissing);
+}
+
+TEST_F(Videos, BeginWithTheFirstImageThatIsShown) {
+  support::write_text(file("left.mov"), trimmed_video(7));
+  support::write_text(file("right.mov"), trimmed_video(2));
+  for (const auto& [name, hidden] : {std::pair("left.mov", 7), {"right.mov", 2}}) {
+    DatasetRequest one = request(file(name));
+    one.cameras = {0};
+    const auto dataset = open_dataset(one);
+    ASSERT_TRUE(dataset) << dataset.error().message();
+    ASSERT_EQ(dataset->frames.size(), static_cast<std::size_t>(kFrames - hidden));
+    for (const std::size_t k : {0, 1, 20, 5, 0}) {
+      const image::ImageBundle frame = read_frame(*dataset, k);
+      EXPECT_EQ(frame.time_ns, static_cast<TimeNs>(k) * 50'000'000);
+      ASSERT_EQ(frame.images[0].state, ImageState::kPresent) << name << ", image " << k;
+      EXPECT_NEAR(frame.images[0].image.row(5)[5], 8 * (static_cast<int>(k) + hidden), 2) << name << ", image " << k;
+    }
+  }
 }
 
 TEST_F(Videos, ACutVideoIsReadAsFarAsItGoes) {

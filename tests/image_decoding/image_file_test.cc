@@ -1,6 +1,7 @@
 #include "image_decoding/image_file.h"
 
 #include <gtest/gtest.h>
+#include <libdeflate.h>
 
 #include <algorithm>
 #include <array>
@@ -140,6 +141,36 @@ TEST(ImageFile, ConvertsColoursToGrey) {
   EXPECT_NEAR(image->row(3)[4], 0.114 * 200 + 0.587 * 100 + 0.299 * 50, 1.01);
 }
 
+// A chunk of a PNG with its length and checksum.
+std::string chunk(const std::string& name, const std::string& data) {
+  const auto big_endian = [](std::uint32_t value) {
+    std::string out;
+    for (int shift = 24; shift >= 0; shift -= 8) out += static_cast<char>(value >> shift);
+    return out;
+  };
+  return big_endian(static_cast<std::uint32_t>(data.size())) + name + data +
+         big_endian(libdeflate_crc32(0, (name + data).data(), name.size() + data.size()));
+}
+
+// JPEG files have no such chunk, and grey values must not depend on the program that wrote an image.
+TEST(ImageFile, IgnoresTheGammaThatAPngDeclares) {
+  const std::string gamma = chunk("gAMA", std::string("\0\0\xb1\x8f", 4)), srgb = chunk("sRGB", std::string(1, '\0')),
+                    primaries = chunk("cHRM", std::string("\0\0\x7a\x26\0\0\x80\x84\0\0\xfa\0\0\0\x80\xe8"
+                                                          "\0\0\x75\x30\0\0\xea\x60\0\0\x3a\x98\0\0\x17\x70",
+                                                          32));
+  for (const int depth : {CV_8U, CV_16U}) {
+    const double one = depth == CV_8U ? 1 : 257;
+    const cv::Mat red(6, 8, CV_MAKETYPE(depth, 3), cv::Scalar(0, 0, 255 * one));
+    const std::string plain = encoded(red, ".png");
+    constexpr std::size_t kAfterHeader = 33;  // signature and the chunk IHDR
+    for (const std::string& added : {std::string(), gamma, srgb, gamma + primaries, srgb + gamma + primaries}) {
+      const auto image = decode_grey(plain.substr(0, kAfterHeader) + added + plain.substr(kAfterHeader));
+      ASSERT_TRUE(image);
+      EXPECT_EQ(image->row(2)[3], 76) << added.size() << " bytes, depth " << depth;
+    }
+  }
+}
+
 TEST(ImageFile, DecodesJpeg) {
   const cv::Mat original = picture_of(64, 48);
   const std::string bytes = encoded(original, ".jpg", {cv::IMWRITE_JPEG_QUALITY, 100});
@@ -203,6 +234,32 @@ TEST(ImageFile, ReadsFiles) {
   EXPECT_EQ(read_image(folder.path() / "a.png").value().width(), 20);
   EXPECT_FALSE(read_image(folder.path() / "b.png"));
   EXPECT_FALSE(read_image(folder.path()));
+}
+
+// Labels are small numbers or dark colours; only zero and black mask a pixel.
+TEST(ImageFile, EveryValueOfAMaskExceptZeroIsUsed) {
+  const support::TemporaryFolder folder;
+  const auto expect_half = [&](const cv::Mat& used, const std::string& name) {
+    cv::Mat mask = cv::Mat::zeros(10, 20, used.type());
+    used.copyTo(mask.rowRange(5, 10));
+    const std::string file = (folder.path() / name).string();
+    ASSERT_TRUE(cv::imwrite(file, mask, {cv::IMWRITE_WEBP_QUALITY, 101}));
+    const auto read = read_mask_file(file);
+    ASSERT_TRUE(read) << read.error().message();
+    for (int y = 0; y < 10; ++y) EXPECT_EQ(read->row(y)[3] != 0, y >= 5) << name << ", row " << y;
+  };
+  for (const int value : {1, 200, 255, 256, 512, 65535})
+    expect_half(cv::Mat(5, 20, CV_16UC1, cv::Scalar(value)), "words.png");
+  for (const cv::Scalar& colour : {cv::Scalar(1, 0, 0), cv::Scalar(0, 1, 0), cv::Scalar(0, 0, 1)}) {
+    for (const char* name : {"colours.png", "colours.webp", "colours.bmp", "colours.tiff", "colours.ppm"})
+      expect_half(cv::Mat(5, 20, CV_8UC3, colour), name);
+    expect_half(cv::Mat(5, 20, CV_16UC3, colour), "colour_words.png");
+  }
+  expect_half(cv::Mat(5, 20, CV_8UC1, cv::Scalar(1)), "grey.png");
+  expect_half(cv::Mat(5, 20, CV_8UC1, cv::Scalar(1)), "grey.pgm");
+  ASSERT_TRUE(cv::imwrite((folder.path() / "dark.jpg").string(), cv::Mat(16, 16, CV_8UC3, cv::Scalar(5, 0, 0)),
+                          {cv::IMWRITE_JPEG_QUALITY, 100}));
+  EXPECT_GT(read_mask_file(folder.path() / "dark.jpg").value().row(8)[8], 0);
 }
 
 TEST(ImageFile, ReadsMasksOfTheCamerasSize) {
