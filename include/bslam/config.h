@@ -44,7 +44,8 @@ class BSLAM_EXPORT Config {
   ~Config();
 
   // Sets one setting from text. On error the setting keeps its value. Errors: an unknown name (the message suggests the
-  // nearest one), a value of another type or out of range.
+  // nearest one), a value of another type or out of range. Here and in files, the name that a setting had in the
+  // release before is accepted; System::create then logs a warning with its present name.
   Status set(std::string_view name, std::string_view value);
   void set_mode(Mode mode);
   Status set_seed(int seed);  // seed of all random numbers; must not be negative

@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+import datetime
+import email.utils
 import http.client
 import json
 import os
@@ -26,10 +28,10 @@ Image = Union[NDArray[np.uint8], bytes, str, "os.PathLike[str]"]
 
 
 class ServiceError(Exception):
-    """A request that the server has refused, or an address at which no server answers.
+    """A request that the server has refused, or an address at which no server of bslam answers.
 
     Attributes:
-        status: status of HTTP; 0 if there was no answer.
+        status: status of HTTP; 0 if there was no answer; 200 if the answer is not one of `bslam serve`.
         retry_after: seconds after which a request may be sent again, if the server is busy; else None.
     """
 
@@ -124,29 +126,41 @@ class Client:
 
         Raises:
             ServiceError: the server has refused the request, such as an image whose size differs from that of its
-                camera, or is busy (`status` 503), or does not answer.
+                camera, or is busy (`status` 503), or does not answer, or is another one.
         """
         content_type, body = _form(images)
-        answer = json.loads(self._request("POST", "/v1/localise", body, {"Content-Type": content_type}))
-        covariance = answer["covariance"]
-        return Localisation(
-            localised=answer["localised"],
-            reason=answer["reason"],
-            T_world_cam0=_pose(answer["T_world_cam0"]),
-            T_world_body=_pose(answer["T_world_body"]),
-            covariance=None if covariance is None else np.array(covariance, dtype=np.float64),
-            scale=answer["scale"],
-            submap=answer["submap"],
-            cameras=answer["cameras"],
-        )
+        answer = self._object("POST", "/v1/localise", body, {"Content-Type": content_type})
+        try:
+            return _localisation(answer)
+        except (KeyError, TypeError, ValueError) as error:
+            raise self._not_of_bslam() from error
 
     def map(self) -> dict[str, Any]:
         """Name, cameras and size of the map."""
-        return json.loads(self._request("GET", "/v1/map"))
+        return self._object("GET", "/v1/map")
 
     def metrics(self) -> str:
         """Counters in the text format of Prometheus."""
-        return self._request("GET", "/metrics").decode()
+        return self._request("GET", "/metrics").decode(errors="replace")
+
+    @property
+    def _address(self) -> str:
+        return f"{'https' if self._encrypted else 'http'}://{self._host}:{self._port}"
+
+    def _not_of_bslam(self) -> ServiceError:
+        return ServiceError(f"{self._address}: found another answer, expected that of bslam serve", 200)
+
+    def _object(
+        self, method: str, path: str, body: bytes = b"", headers: Mapping[str, str] | None = None
+    ) -> dict[str, Any]:
+        """The answer, which is an object of JSON."""
+        try:
+            answer = json.loads(self._request(method, path, body, headers))
+        except ValueError as error:
+            raise self._not_of_bslam() from error
+        if not isinstance(answer, dict):
+            raise self._not_of_bslam()
+        return answer
 
     def _request(self, method: str, path: str, body: bytes = b"", headers: Mapping[str, str] | None = None) -> bytes:
         kind = http.client.HTTPSConnection if self._encrypted else http.client.HTTPConnection
@@ -156,14 +170,41 @@ class Client:
             response = connection.getresponse()
             answer = response.read()
         except (OSError, http.client.HTTPException) as error:
-            scheme = "https" if self._encrypted else "http"
-            raise ServiceError(f"{scheme}://{self._host}:{self._port}: {error}") from error
+            raise ServiceError(f"{self._address}: {error}") from error
         finally:
             connection.close()
         if response.status == 200:
             return answer
-        after = response.getheader("Retry-After")
-        raise ServiceError(_reason(answer), response.status, float(after) if after else None)
+        raise ServiceError(_reason(answer), response.status, _seconds_until(response.getheader("Retry-After")))
+
+
+def _seconds_until(retry_after: str | None) -> float | None:
+    """The header Retry-After, which is a number of seconds, or a date, such as proxies send."""
+    if retry_after is None:
+        return None
+    if retry_after.strip().isdecimal():
+        return float(retry_after)
+    try:
+        date = email.utils.parsedate_to_datetime(retry_after)
+    except (TypeError, ValueError):
+        return None
+    if date.tzinfo is None:  # "-0000": a time of UTC
+        date = date.replace(tzinfo=datetime.timezone.utc)
+    return max(0.0, (date - datetime.datetime.now(datetime.timezone.utc)).total_seconds())
+
+
+def _localisation(answer: Mapping[str, Any]) -> Localisation:
+    covariance = answer["covariance"]
+    return Localisation(
+        localised=answer["localised"],
+        reason=answer["reason"],
+        T_world_cam0=_pose(answer["T_world_cam0"]),
+        T_world_body=_pose(answer["T_world_body"]),
+        covariance=None if covariance is None else np.array(covariance, dtype=np.float64),
+        scale=answer["scale"],
+        submap=answer["submap"],
+        cameras=answer["cameras"],
+    )
 
 
 def _reason(answer: bytes) -> str:

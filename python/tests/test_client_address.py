@@ -51,6 +51,70 @@ class Proxy(http.server.BaseHTTPRequestHandler):
         pass
 
 
+class Other(http.server.BaseHTTPRequestHandler):
+    """A server that is not bslam serve; the path says what it answers."""
+
+    answers = {
+        "/page/v1/map": (200, {}, b"<html>hello</html>"),
+        "/list/v1/map": (200, {}, b"[1, 2]"),
+        "/bytes/v1/map": (200, {}, b"\xff\xfe"),
+        "/empty/v1/localise": (200, {}, b"{}"),
+        "/late/v1/map": (503, {"Retry-After": "Fri, 31 Dec 2100 23:59:59 GMT"}, b"busy"),
+        "/past/v1/map": (503, {"Retry-After": "Fri, 31 Dec 1999 23:59:59 GMT"}, b"busy"),
+        "/soon/v1/map": (503, {"Retry-After": "2"}, b"busy"),
+        "/odd/v1/map": (503, {"Retry-After": "soon"}, b"busy"),
+        "/never/v1/map": (503, {}, b"busy"),
+    }
+
+    def do_GET(self):
+        status, headers, body = self.answers[self.path]
+        self.rfile.read(int(self.headers["Content-Length"] or 0))
+        self.send_response(status)
+        for name, value in {**headers, "Content-Length": str(len(body))}.items():
+            self.send_header(name, value)
+        self.end_headers()
+        self.wfile.write(body)
+
+    do_POST = do_GET
+
+    def log_message(self, *_):
+        pass
+
+
+@pytest.fixture
+def other():
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), Other) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        yield f"http://127.0.0.1:{server.server_port}"
+        server.shutdown()
+        thread.join()
+
+
+def test_an_answer_of_another_server_is_an_error_of_the_service(other):
+    text = f"^{other}: found another answer, expected that of bslam serve$"
+    for folder in ("page", "list", "bytes"):
+        with pytest.raises(ServiceError, match=text) as caught:
+            Client(f"{other}/{folder}").map()
+        assert caught.value.status == 200
+    with pytest.raises(ServiceError, match=text):
+        Client(f"{other}/empty").localise({"cam0": b"P5 1 1 255\n0"})
+
+
+def test_the_time_to_retry_may_be_a_date_and_need_not_be_understood(other):
+    def retry_after(folder):
+        with pytest.raises(ServiceError, match="^busy$") as caught:
+            Client(f"{other}/{folder}").map()
+        assert caught.value.status == 503
+        return caught.value.retry_after
+
+    assert retry_after("late") > 1e9
+    assert retry_after("past") == 0
+    assert retry_after("soon") == 2
+    assert retry_after("odd") is None
+    assert retry_after("never") is None
+
+
 @pytest.mark.skipif(shutil.which("openssl") is None, reason="needs openssl for a certificate")
 def test_a_proxy_with_a_certificate_is_asked_if_the_certificate_is_trusted(tmp_path, monkeypatch):
     key, certificate = tmp_path / "key.pem", tmp_path / "certificate.pem"

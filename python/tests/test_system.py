@@ -171,6 +171,17 @@ def test_events_are_reported(recording):
     assert {level for level, _ in lines} <= {"info", "warning"} and all("\n" not in line for _, line in lines)
 
 
+def test_former_names_of_settings_are_warnings(recording):
+    lines = []
+    bslam.System(
+        bslam.Rig.load(recording.folder),
+        settings={"tracking.own_times": False},
+        on_log=lambda level, line: lines.append((level, line)),
+    )
+    text = "setting 'tracking.own_times' is now called"
+    assert [level for level, line in lines if line.startswith(text)] == ["warning"]
+
+
 def test_exception_in_a_callback_is_raised(recording):
     def fail(event):
         raise KeyError("mine")

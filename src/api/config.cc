@@ -36,8 +36,12 @@ Config::~Config() = default;
 
 Status Config::set(std::string_view name, std::string_view value) {
   return api::guarded("Config::set", [&]() -> Status {
-    const Status status = OptionTable(impl_->config).set(name, value);
-    if (status) return status;
+    OptionTable table(impl_->config);
+    const Status status = table.set(name, value);
+    if (status) {
+      impl_->keep(table.warnings());
+      return status;
+    }
     Error error = status.error();
     error.file = "Config::set";
     return error;
@@ -53,6 +57,7 @@ Status Config::load(const std::filesystem::path& file) {
     Impl changed = *impl_;
     OptionTable table(changed.config);
     if (const Status status = yaml::apply_config_file(table, file); !status) return status;
+    changed.keep(table.warnings());
     *impl_ = std::move(changed);
     return {};
   });

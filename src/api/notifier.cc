@@ -25,10 +25,12 @@ void Notifier::call(const Callback& callback, const Arguments&... arguments) {
 
 void Notifier::log(LogLevel level, const std::string& line) { call(callbacks_.log, level, line); }
 
-Status Notifier::started(const char* name, const Rig& rig, const std::string& map_warning, bool map_without_words) {
+Status Notifier::started(const char* name, const Rig& rig, const std::vector<std::string>& of_settings,
+                         const std::string& map_warning, bool map_without_words) {
   begin(name);
   for (const std::string& note : rig.notes()) log(LogLevel::kInfo, "rig: " + note);
   for (const std::string& warning : rig.warnings()) log(LogLevel::kWarning, "rig: " + warning);
+  for (const std::string& warning : of_settings) log(LogLevel::kWarning, warning);
   if (!map_warning.empty()) log(LogLevel::kWarning, "map: the run that made it has found: " + map_warning);
   if (map_without_words) log(LogLevel::kWarning, "map: it has no visual words, so that the rig cannot be found in it");
   return failure_;

@@ -3,6 +3,7 @@
 
 #include <bslam/system.h>
 
+#include <string>
 #include <vector>
 
 #include "camera/rig.h"
@@ -17,8 +18,10 @@ class Notifier {
  public:
   Notifier(Callbacks callbacks, const camera::Rig& rig) : callbacks_(std::move(callbacks)), rig_(rig) {}
 
-  // Logs notes and warnings about the rig, and what is wrong with the loaded map, before the first frame.
-  Status started(const char* name, const Rig& rig, const std::string& map_warning, bool map_without_words);
+  // Logs notes and warnings about the rig, the warnings about settings, and what is wrong with the loaded map, before
+  // the first frame.
+  Status started(const char* name, const Rig& rig, const std::vector<std::string>& of_settings,
+                 const std::string& map_warning, bool map_without_words);
   Status processed(const char* name, const FrameResult& frame, const system::System& system);
   Status finished(const char* name, const system::System& system);
 

@@ -171,7 +171,8 @@ Result<System> System::create(const Rig& rig, const Config& config, Startup star
     if (!resources) return resources.error();
     const bool without_words = resources->map_without_words;
     auto impl = std::make_unique<Impl>(rig, settings, *std::move(resources), std::move(startup.callbacks));
-    const Status started = impl->notifier.started("System::create", rig, impl->map_warning, without_words);
+    const Status started = impl->notifier.started("System::create", rig, api::Access::impl(config).warnings,
+                                                  impl->map_warning, without_words);
     if (!started) return started.error();
     return System(std::move(impl));
   });

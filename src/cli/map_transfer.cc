@@ -28,11 +28,12 @@ int map_transfer(const TransferArguments& arguments) {
   if (!own) return report_error(own.error());
   const auto merged = storage::read_map(arguments.to);
   if (!merged) return report_error(merged.error());
-  const auto moved = session::transfer_trajectory(*trajectory, *own, *merged);
-  if (!moved) return report_error(moved.error());
   const auto input = evaluation::read_comments(arguments.trajectory);
+  const auto moved = session::transfer_trajectory(*trajectory, *own, *merged, input);
+  if (!moved) return report_error(moved.error());
   const std::string parent = moved->submap == 0 ? "world" : fmt::format("world_of_submap_{}", moved->submap + 1);
   std::string comments = evaluation::trajectory_header(input.frame.empty() ? "cam0" : input.frame, input.state, parent);
+  if (input.scale != "metric") comments += "\n# " + evaluation::scale_comment(input.scale);
   if (input.image_stamps) comments += "\n# " + evaluation::image_stamp_comment();
   const Status s =
       evaluation::write_trajectory(arguments.out, moved->poses, evaluation::TrajectoryFormat::kTum, comments);

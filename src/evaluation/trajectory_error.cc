@@ -78,6 +78,13 @@ std::size_t count_covered(const Trajectory& ground_truth, TimeNs start, double s
   return covered;
 }
 
+// The number of frames between an end of the estimate and that of the ground truth. A single one is not counted: ground
+// truth usually begins a little before the first image and ends a little after the last, by up to an interval.
+TimeNs frames_beyond(TimeNs duration_ns, TimeNs interval_ns) {
+  const TimeNs frames = std::max<TimeNs>(0, duration_ns / interval_ns);
+  return frames == 1 ? 0 : frames;
+}
+
 // Counts frames with ground truth but without a pose: in the gaps of the estimate, before its first pose and after its
 // last.
 std::size_t count_missing_frames(const Trajectory& estimate, const Trajectory& ground_truth, TimeNs interval_ns,
@@ -93,8 +100,8 @@ std::size_t count_missing_frames(const Trajectory& estimate, const Trajectory& g
         count_covered(ground_truth, from, static_cast<double>(gap) / static_cast<double>(steps), steps - 1, tolerance);
   }
   const TimeNs first = estimate.front().time_ns, last = estimate.back().time_ns;
-  const TimeNs before = std::max<TimeNs>(0, (first - ground_truth.front().time_ns + tolerance) / interval_ns);
-  const TimeNs after = std::max<TimeNs>(0, (ground_truth.back().time_ns + tolerance - last) / interval_ns);
+  const TimeNs before = frames_beyond(first - ground_truth.front().time_ns + tolerance, interval_ns);
+  const TimeNs after = frames_beyond(ground_truth.back().time_ns + tolerance - last, interval_ns);
   missing += count_covered(ground_truth, first - (before + 1) * interval_ns, interval, before, tolerance);
   missing += count_covered(ground_truth, last, interval, after, tolerance);
   return missing;

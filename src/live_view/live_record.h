@@ -1,4 +1,4 @@
-// The data of the live view: the session::RunRecord of a run in progress, extended with every frame.
+// The data of the live view: the session::RunRecord of a run in progress, which is built from a log of its frames.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -7,18 +7,11 @@
 
 #include "dataset/dataset.h"
 #include "geometry/up_axis.h"
+#include "live_view/frame_log.h"
 #include "session/run_record.h"
 #include "system/system.h"
 
 namespace bslam::live_view {
-
-// An input frame of the run.
-struct InputFrame {
-  TimeNs time_ns = 0;
-  std::optional<tracking::FrameRecord> record;  // nullopt if it was dropped
-  double read_ms = 0;
-  TimeNs relocalised_with_ns = 0;  // time of the keyframe, if the frame was relocalised
-};
 
 // Results of background stages.
 struct StageResults {
@@ -33,24 +26,25 @@ class LiveRecord {
   // the record.
   LiveRecord(const dataset::Dataset& dataset, const system::Config& config, std::size_t loaded_keyframes);
 
-  void add(InputFrame&& frame);
+  // Adds the next frames.
+  void append(FrameLog&& frames);
 
   // Returns the data of the page (session/report_data.h) for the current map. The cost is proportional to the number of
-  // frames. Poses, frames and landmarks are subsampled to a few thousand.
+  // frames, and so is the memory during the call. Poses, frames and landmarks are subsampled to a few thousand.
   nlohmann::ordered_json run_json(const map::BundledMap& map, const camera::Rig& rig, const StageResults& results,
-                                  const std::optional<geometry::UpAxis>& up);
+                                  const std::optional<geometry::UpAxis>& up) const;
 
   // Seconds since the first image of the data set.
   double seconds(TimeNs time_ns) const { return to_seconds(time_ns - dataset_.first_time_ns); }
 
  private:
   std::vector<system::SubmapTrajectory> paths(const map::BundledMap& map) const;
-  void withdraw_map();
+  session::RunRecord record_of_frames() const;
 
   const dataset::Dataset& dataset_;
   const std::size_t loaded_keyframes_;
-  session::RunRecord record_;
-  std::vector<session::StageSeries> caller_stages_;
+  session::RunRecord start_;  // what is known before the first frame
+  FrameLog frames_;
 };
 
 }  // namespace bslam::live_view

@@ -21,7 +21,9 @@ enum class Phase { kFeeding, kFinishing, kEnded };
 
 // The data that the run passes to the view.
 struct Mailbox {
-  std::vector<InputFrame> frames;                       // all frames since the view last read them
+  explicit Mailbox(std::size_t cameras) : frames(cameras) {}
+
+  FrameLog frames;                                      // all frames since the view last read them
   std::shared_ptr<const session::ProcessedFrame> last;  // the newest processed frame
   std::optional<StageResults> results;
   Phase phase = Phase::kFeeding;
@@ -56,17 +58,19 @@ class LiveView::Content final : public web_server::Content {
   Content(Subject subject, session::RunControl& control)
       : subject_(std::move(subject)),
         control_(control),
+        mailbox_(subject_.dataset.rig.size()),
         record_(subject_.dataset, subject_.config, subject_.loaded_keyframes),
         settings_(session::settings_json(subject_.config)) {}
 
   // ---- Called by the thread of the run
 
-  void add(InputFrame&& frame, std::shared_ptr<const session::ProcessedFrame> processed, const system::System* system) {
+  void add(const InputFrame& frame, std::shared_ptr<const session::ProcessedFrame> processed,
+           const system::System* system) {
     std::optional<StageResults> results;
     if (system && results_wanted_.exchange(false))
       results = StageResults{system->stage_runs(), system->loops(), system->maps_started()};
     const std::lock_guard lock(mutex_);
-    mailbox_.frames.push_back(std::move(frame));
+    mailbox_.frames.add(frame);
     ++mailbox_.fed;
     if (processed) mailbox_.last.swap(processed);
     if (results) mailbox_.results = std::move(results);
@@ -125,18 +129,18 @@ class LiveView::Content final : public web_server::Content {
 
   // Takes what has come since the last call. The lock is only held while pointers are exchanged.
   void collect() {
-    std::vector<InputFrame> frames;
+    FrameLog frames(subject_.dataset.rig.size());
     std::optional<StageResults> results;
     {
       const std::lock_guard lock(mutex_);
-      frames.swap(mailbox_.frames);
+      std::swap(frames, mailbox_.frames);
       results.swap(mailbox_.results);
       last_ = mailbox_.last;
       fed_ = mailbox_.fed;
       phase_ = mailbox_.phase;
       if (report_.empty()) report_.swap(mailbox_.report);
     }
-    for (InputFrame& frame : frames) record_.add(std::move(frame));
+    record_.append(std::move(frames));
     if (results) results_ = *std::move(results);
   }
 
@@ -195,13 +199,16 @@ const std::string& LiveView::url() const { return server_->url(); }
 bool LiveView::is_watched() const { return server_->is_watched(); }
 
 void LiveView::processed(session::ProcessedFrame&& frame, const system::System& system) {
-  InputFrame input{frame.record.result.time_ns, frame.record, frame.read_ms, 0};
-  if (frame.record.relocalisation)
-    input.relocalised_with_ns = system.keyframe_time(frame.record.relocalisation->matched_keyframe);
-  content_->add(std::move(input), std::make_shared<const session::ProcessedFrame>(std::move(frame)), &system);
+  const auto shared = std::make_shared<const session::ProcessedFrame>(std::move(frame));
+  const tracking::FrameRecord& record = shared->record;
+  InputFrame input{record.result.time_ns, &record, shared->read_ms, 0};
+  if (record.relocalisation) input.relocalised_with_ns = system.keyframe_time(record.relocalisation->matched_keyframe);
+  content_->add(input, shared, &system);
 }
 
-void LiveView::dropped(TimeNs time_ns, double read_ms) { content_->add({time_ns, {}, read_ms, 0}, nullptr, nullptr); }
+void LiveView::dropped(TimeNs time_ns, double read_ms) {
+  content_->add({time_ns, nullptr, read_ms, 0}, nullptr, nullptr);
+}
 
 void LiveView::fed() { content_->enter(Phase::kFinishing); }
 

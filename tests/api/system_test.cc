@@ -303,6 +303,32 @@ TEST_F(PublicSystem, DiscardsFramesBeyondItsHistory) {
   }
 }
 
+TEST_F(PublicSystem, WarnsOfFormerNamesOfSettings) {
+  const TemporaryFolder folder;
+  support::write_text(folder.path() / "old.yaml", "bundling:\n  near_m: 0.4\n");
+  Config config;
+  ASSERT_TRUE(config.load(folder.path() / "old.yaml"));
+  for (int twice = 0; twice < 2; ++twice) ASSERT_TRUE(config.set("mapping.culling.min_found_share", "0.3"));
+  Startup startup;
+  std::vector<std::string> warnings;
+  startup.callbacks.log = [&](LogLevel level, std::string_view line) {
+    if (level == LogLevel::kWarning) warnings.emplace_back(line);
+  };
+  const Config copy = config;
+  ASSERT_TRUE(System::create(TexturedWall::rig(), copy, startup));
+  ASSERT_EQ(warnings.size(), 2u);
+  EXPECT_TRUE(warnings[0].starts_with("setting 'bundling.near_m' is now called '")) << warnings[0];
+  EXPECT_TRUE(warnings[1].starts_with("setting 'mapping.culling.min_found_share' is now called '")) << warnings[1];
+}
+
+// Tracking looks at the frames of the last second.
+TEST_F(PublicSystem, KeepsTheFramesThatTrackingNeedsInTheShortestHistory) {
+  auto system = make_system({.history_frames = 1});
+  process(system, 0, kFrames);
+  ASSERT_TRUE(system.finish());
+  EXPECT_GE(system.trajectory().value().size(), 5u);
+}
+
 // Images with padded rows give the same results as packed images.
 TEST_F(PublicSystem, ReadsImagesWithAnyStride) {
   auto borrowed = make_system(), packed = make_system();

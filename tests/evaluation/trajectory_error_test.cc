@@ -164,12 +164,24 @@ TEST(Coverage, CountsFramesWithDenserGroundTruth) {
   EXPECT_DOUBLE_EQ(result->coverage, 128.0 / 150.0);
 }
 
+// As EuRoC ground truth of a simulated recording, which ends an interval after the last image.
+TEST(Coverage, IsCompleteIfGroundTruthBeginsAndEndsWithinAnIntervalOfTheImages) {
+  const Trajectory dense = winding(1991, kFrame / 10), frames = winding(200);  // both end with frame 199
+  const auto coverage_of = [&](std::size_t from, std::size_t to) {
+    const auto result = evaluate(Trajectory(frames.begin() + from, frames.begin() + to), dense, {});
+    return result ? result->coverage : 0.0;
+  };
+  EXPECT_DOUBLE_EQ(coverage_of(1, 199), 1.0);
+  EXPECT_DOUBLE_EQ(coverage_of(2, 199), 197.0 / 199.0) << "frames 0 and 1";
+  EXPECT_DOUBLE_EQ(coverage_of(1, 197), 196.0 / 199.0) << "frames 197, 198 and 199";
+}
+
 TEST(Coverage, IsFastWithAStrayTimestampFarAway) {
   Trajectory truth = winding(2000, kFrame / 10);
   truth.insert(truth.begin(), still(0, 0, 0, 0));  // half a century before the rest
   const auto result = evaluate(winding(200), truth, {});
   ASSERT_TRUE(result.ok());
-  EXPECT_NEAR(result->coverage, 200.0 / 201.0, 1e-12);
+  EXPECT_NEAR(result->coverage, 1.0, 1e-12);
 }
 
 TEST(TrajectoryError, RejectsFewerThanThreePairs) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <memory>
 
+#include "evaluation/association.h"
 #include "looping/simulated_hall.h"
 #include "session/keyframe_identity.h"
 #include "session/transfer_trajectory.h"
@@ -202,6 +203,99 @@ TEST(TransferTrajectory, FollowsTheKeyframesOfTheRun) {
              looping::distance_m(site.map.keyframe(k).T_rig_world, pose.T_world_frame.inverse()) < 1e-6;
     }));
   }
+}
+
+// Two recordings that begin at the same stamp: the second one was not located in the map of the first and started a
+// submap of its own, whose first pose is the origin too.
+SavedMap with_overlapping_stamps(TimeNs time_offset_ns = 0) {
+  const camera::Rig cameras = looping::rig_of(2);
+  std::vector<camera::RigCamera> late;
+  for (std::size_t c = 0; c < cameras.size(); ++c) {
+    late.push_back({cameras.camera(c), cameras.body_from_cam(c)});
+    late.back().camera.time_offset_ns = time_offset_ns;
+  }
+  const camera::Rig rig(late);
+  const synthetic::FeatureSimulator simulator = looping::hall(rig);
+  HallMap out(rig);
+  for (const auto& [first, count] : {std::pair(0, 12), std::pair(30, 5)}) {
+    const SE3 T_room_first = simulator.frame(FrameId(first), looping::kStepS * first).T_world_rig;
+    const geometry::Sim3 world(T_room_first.inverse());
+    for (int i = 0; i < count; ++i) {
+      synthetic::SimulatedFrame seen = simulator.frame(FrameId(first + i), looping::kStepS * (first + i));
+      seen.frame.time_ns = from_seconds(looping::kStepS * i) + time_offset_ns;
+      out.add(seen, world, 0, {}, i == 0);
+    }
+  }
+  return saved(out.map, "two");
+}
+
+TEST(TransferTrajectory, UsesTheSubmapThatThePosesAreIn) {
+  const SavedMap own = with_overlapping_stamps();
+  const std::vector<storage::Submap> submaps = storage::submaps_of(own.map);
+  ASSERT_EQ(submaps.size(), 2u);
+  const SE3 T_rig_body(geometry::so3_exp(geometry::Vector3d(0.3, -1.2, 0.5)), geometry::Vector3d(0.4, 0.1, -0.3));
+  for (std::size_t s = 0; s < submaps.size(); ++s) {
+    const evaluation::Trajectory rig = storage::keyframe_trajectory(own.map, submaps[s]);
+    for (const evaluation::Trajectory& poses : {rig, evaluation::moved_to_frame(rig, T_rig_body)}) {
+      const auto moved = transfer_trajectory(poses, own, own);
+      ASSERT_TRUE(moved) << moved.error().message();
+      EXPECT_EQ(moved->submap, s);
+      EXPECT_EQ(moved->keyframes, submaps[s].keyframes.size());
+      for (std::size_t i = 0; i < poses.size(); ++i)
+        EXPECT_LT(looping::distance_m(moved->poses[i].T_world_frame, poses[i].T_world_frame), 1e-9);
+    }
+  }
+}
+
+TEST(TransferTrajectory, RefusesPosesOfAnotherRun) {
+  const SavedMap own = with_overlapping_stamps();
+  evaluation::Trajectory poses = storage::keyframe_trajectory(own.map, storage::submaps_of(own.map)[0]);
+  const SE3 elsewhere(geometry::so3_exp(geometry::Vector3d(0.1, 0, 0.2)), geometry::Vector3d(3, 1, 0));
+  for (evaluation::TimedPose& pose : poses) pose.T_world_frame = elsewhere * pose.T_world_frame;
+  const auto moved = transfer_trajectory(poses, own, own);
+  ASSERT_FALSE(moved);
+  EXPECT_EQ(moved.error().message(),
+            "two.bmap: keyframes: found none with the time and the pose of a pose of the trajectory, expected the map "
+            "that the run of the trajectory has saved");
+}
+
+// The first poses of both runs are the origin.
+TEST(TransferTrajectory, RefusesPosesOfAnotherRunThatBeginsAtTheSameTime) {
+  const SavedMap own = with_overlapping_stamps();
+  evaluation::Trajectory poses = storage::keyframe_trajectory(own.map, storage::submaps_of(own.map)[0]);
+  for (evaluation::TimedPose& pose : poses) pose.T_world_frame = geometry::scaled(pose.T_world_frame, 1.2);
+  EXPECT_FALSE(transfer_trajectory(poses, own, own));
+}
+
+// Poses as they were reported differ from those of the map by its later corrections.
+TEST(TransferTrajectory, FindsPosesThatWereReportedDuringTheRun) {
+  const SavedMap own = with_overlapping_stamps();
+  const storage::Submap second = storage::submaps_of(own.map)[1];
+  evaluation::Trajectory poses = storage::keyframe_trajectory(own.map, second);
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const SE3 drift(geometry::Quaterniond::Identity(), {0.02 * static_cast<double>(i), 0, 0});
+    poses[i].T_world_frame = poses[i].T_world_frame * drift;
+  }
+  evaluation::TrajectoryComments comments;
+  comments.state = evaluation::PoseState::kLive;
+  const auto moved = transfer_trajectory(poses, own, own, comments);
+  ASSERT_TRUE(moved) << moved.error().message();
+  EXPECT_EQ(moved->submap, 1u);
+  EXPECT_EQ(moved->keyframes, second.keyframes.size());
+}
+
+TEST(TransferTrajectory, AddsTheTimeOffsetToTheStampsOfImages) {
+  constexpr TimeNs kOffset = 40'000'000;
+  const SavedMap own = with_overlapping_stamps(kOffset);
+  evaluation::Trajectory poses = storage::keyframe_trajectory(own.map, storage::submaps_of(own.map)[0]);
+  for (evaluation::TimedPose& pose : poses) pose.time_ns -= kOffset;
+  EXPECT_FALSE(transfer_trajectory(poses, own, own)) << "these are not capture times";
+  evaluation::TrajectoryComments comments;
+  comments.image_stamps = true;
+  const auto moved = transfer_trajectory(poses, own, own, comments);
+  ASSERT_TRUE(moved) << moved.error().message();
+  EXPECT_EQ(moved->keyframes, 12u);
+  EXPECT_EQ(moved->poses.front().time_ns, poses.front().time_ns);
 }
 
 TEST(TransferTrajectory, NamesAMapThatDoesNotContainTheRun) {

@@ -158,6 +158,25 @@ TEST_F(CommandLine, AnExportDoesNotReplaceItsMap) {
   EXPECT_NE(read_text(before_link), bytes);
 }
 
+TEST_F(CommandLine, ATransferredTrajectoryKeepsItsComments) {
+  const std::string map = out("transferred.bmap"), moved = out("transferred.tum");
+  summary_of("transferred", "--cameras 0,1 --image-stamps --save-map " + map);
+  std::string text = read_text(out("transferred/trajectory.tum"));
+  text.insert(text.find('\n') + 1, "# scale=up-to-scale: lengths are not in metres\n");
+  support::write_text(out("of_one_camera.tum"), text);
+  const Ran ran =
+      run("map transfer " + out("of_one_camera.tum") + " --from " + map + " --to " + map + " --out " + moved);
+  ASSERT_EQ(ran.status, 0) << ran.err;
+  EXPECT_NE(read_text(moved).find("\n# scale=up-to-scale: lengths are not in metres\n"), std::string::npos);
+  EXPECT_NE(read_text(moved).find("\n# time stamps are those of the images"), std::string::npos);
+  const Ran other = run("map transfer " + data() + "/groundtruth_cam0.tum --from " + map + " --to " + map + " --out " +
+                        out("never.tum"));
+  EXPECT_EQ(other.status, 2);
+  EXPECT_NE(other.err.find("keyframes: found none with the time and the pose of a pose of the trajectory"),
+            std::string::npos)
+      << other.err;
+}
+
 TEST_F(CommandLine, NumbersAreFinite) {
   const std::string base = "run " + data() + " --out " + out("rejected");
   const std::vector<std::string> all = {base + " --rate nan",
