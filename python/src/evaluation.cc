@@ -44,6 +44,9 @@ evaluation::TimedPose pose_of(const double* row, const std::string& name, std::s
   for (int k = 0; k < 8; ++k) {
     if (!std::isfinite(row[k])) raise({name, key, "a value that is not a finite number", "t, x, y, z, qx, qy, qz, qw"});
   }
+  constexpr double kMax_s = 4e9;  // as in files
+  if (std::abs(row[0]) > kMax_s)
+    raise({name, key, "the time " + std::to_string(row[0]) + " s", "seconds from -4e9 to 4e9"});
   const Eigen::Quaterniond q(row[7], row[4], row[5], row[6]);
   if (std::abs(q.norm() - 1) > 1e-3) raise({name, key, "a quaternion of norm " + std::to_string(q.norm()), "1"});
   return {from_seconds(row[0]), geometry::SE3(q, {row[1], row[2], row[3]})};

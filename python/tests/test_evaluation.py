@@ -119,11 +119,13 @@ def test_errors_are_the_line_of_the_program(recording, program, tmp_path):
 
 def test_wrong_arrays_and_options_are_errors(recording):
     truth = np.loadtxt(recording.ground_truth)
+    nanoseconds = (truth + [1.7e9, *[0] * 7]) * [1e9, *[1] * 7]
     cases = [
         (truth[:, :7], {}, r"^est: found shape \(\d+, 7\), expected \(n, 8\)"),
         (truth[::-1], {}, "^est: row 1: found a time that is not after the one before, expected times that increase$"),
         (truth * 2, {}, "^est: row 0: found a quaternion of norm 2.0+, expected 1$"),
         (truth * np.nan, {}, "^est: row 0: found a value that is not a finite number"),
+        (nanoseconds, {}, r"^est: row 0: found the time \d+\.0+ s, expected seconds from -4e9 to 4e9$"),
         (truth, {"align": "se2"}, "^evaluate: align: found se2, expected se3, sim3 or none$"),
         (truth, {"gt_frame": "body"}, "^evaluate: gt_frame=body: found no rig"),
         (truth, {"max_dt": -1}, "^evaluate: max_dt: found -1"),
