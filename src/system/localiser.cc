@@ -17,9 +17,7 @@ namespace {
 Config config_to_localise(Config config) {
   config.localize_only = true;
   config.mode = execution::Mode::kSequential;
-  config.calibration.refine = calibration::Refine::kFalse;
-  config.calibration.check = false;
-  return config;
+  return without_calibration(std::move(config));
 }
 
 // Returns the same version of the map for every frame, and changes nothing.

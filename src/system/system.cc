@@ -58,10 +58,7 @@ CamerasOfRun find_cameras(std::optional<map::BundledMap>& map, const camera::Rig
 
 // If the map has cameras of other rigs, their calibration is constant.
 Config config_for(Config config, std::size_t cameras_of_run, const camera::Rig& rig) {
-  if (cameras_of_run == rig.size()) return config;
-  config.calibration.refine = calibration::Refine::kFalse;
-  config.calibration.check = false;
-  return config;
+  return cameras_of_run == rig.size() ? config : without_calibration(std::move(config));
 }
 
 }  // namespace
