@@ -86,11 +86,27 @@ std::vector<StageTask> following(const StageTask& task, const map::BundledMap& n
   return out;
 }
 
-std::vector<Stage> superseded_by(Stage stage, const StageResult& result, const map::BundledMap& newest) {
-  if (!result.draft || result.draft->superseded(newest)) return {};
+namespace {
+
+// The stages whose tasks a result of `stage` supersedes. `corrects`: it moves the map.
+std::vector<Stage> superseded(Stage stage, bool corrects) {
   if (stage == Stage::kCalibrate) return {Stage::kGlobal};
   if (stage != Stage::kLoop) return {};
-  return result.draft->corrects() ? std::vector{Stage::kCalibrate, Stage::kGlobal} : std::vector{Stage::kGlobal};
+  return corrects ? std::vector{Stage::kCalibrate, Stage::kGlobal} : std::vector{Stage::kGlobal};
+}
+
+}  // namespace
+
+std::vector<Stage> superseded_by(Stage stage, const StageResult& result, const map::BundledMap& newest) {
+  if (!result.draft || result.draft->superseded(newest)) return {};
+  return superseded(stage, result.draft->corrects());
+}
+
+bool can_be_superseded(Stage stage) {
+  return std::ranges::any_of(kStages, [&](Stage by) {
+    const std::vector<Stage> dropped = superseded(by, true);
+    return std::ranges::find(dropped, stage) != dropped.end();
+  });
 }
 
 }  // namespace bslam::execution

@@ -81,6 +81,10 @@ bool awaited(const StageTask& task, const map::BundledMap& newest);
 // committed.
 std::vector<Stage> superseded_by(Stage stage, const StageResult& result, const map::BundledMap& newest);
 
+// Whether tasks of a stage can be dropped because of a result of another stage; a dropped task leaves no entry in the
+// journal.
+bool can_be_superseded(Stage stage);
+
 // Report of one run of a stage for the observer.
 struct StageRun {
   StageTask task;

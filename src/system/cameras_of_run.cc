@@ -28,9 +28,7 @@ Status check_settings(const Config& config, const map::BundledMap& map, const ca
 }
 
 void note_other_rigs(const map::BundledMap& map, const camera::Rig& rig, Config& config) {
-  if (!shared_with_other_rigs(map, rig)) return;
-  config.calibration.refine = calibration::Refine::kFalse;
-  config.calibration.check = false;
+  if (shared_with_other_rigs(map, rig)) config = without_calibration(std::move(config));
 }
 
 image::ImageBundle widened(const image::ImageBundle& images, CamerasOfRun cameras, std::size_t all) {

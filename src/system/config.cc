@@ -4,6 +4,12 @@
 
 namespace bslam::system {
 
+Config without_calibration(Config config) {
+  config.calibration.refine = calibration::Refine::kFalse;
+  config.calibration.check = false;
+  return config;
+}
+
 tracking::TrackerOptions tracker_options(const Config& config, CamerasOfRun cameras) {
   return {.tracking = config.tracking,
           .features = config.features,

@@ -71,6 +71,10 @@ struct CamerasOfRun {
   std::size_t first = 0, size = 0;
 };
 
+// The settings of a run that keeps the calibration as given: it is neither estimated nor checked. A map that serves
+// several rigs keeps theirs.
+Config without_calibration(Config config);
+
 // The options of the front end.
 tracking::TrackerOptions tracker_options(const Config& config, CamerasOfRun cameras = {});
 

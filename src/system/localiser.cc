@@ -1,7 +1,6 @@
 #include "system/localiser.h"
 
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
 #include <utility>
 
@@ -10,6 +9,7 @@
 #include "system/input_check.h"
 #include "system/pipeline.h"
 #include "system/relocaliser.h"
+#include "tracking/map_doubt.h"
 
 namespace bslam::system {
 namespace {
@@ -17,9 +17,7 @@ namespace {
 Config config_to_localise(Config config) {
   config.localize_only = true;
   config.mode = execution::Mode::kSequential;
-  config.calibration.refine = calibration::Refine::kFalse;
-  config.calibration.check = false;
-  return config;
+  return without_calibration(std::move(config));
 }
 
 // Returns the same version of the map for every frame, and changes nothing.
@@ -83,14 +81,6 @@ class PlacesOfThread final : public looping::PlaceRecogniser {
 
 }  // namespace
 
-bool contradicts_pose(const tracking::CameraCounts& camera) {
-  constexpr int kMinMatches = 30;
-  constexpr double kMinShare = 0.25, kHalf = 0.5, kSigmas = 3;
-  const double sigma = std::sqrt(kHalf * (1 - kHalf) * camera.matched);
-  const double least = std::max(kMinShare * camera.matched, kHalf * camera.matched - kSigmas * sigma);
-  return camera.matched >= kMinMatches && camera.inliers < least;
-}
-
 Localiser::Localiser(camera::Rig rig, const Config& config, map::BundledMap map, place::VocabularyPtr vocabulary,
                      std::vector<image::Image> masks)
     : run_rig_(std::move(rig)),
@@ -111,7 +101,8 @@ Result<tracking::FrameRecord> Localiser::localise(const image::ImageBundle& imag
   Pipeline::Outcome outcome = pipeline.process(widened(images, cameras_, rig_.size()), map);
   narrow(outcome.record, cameras_);
   tracking::TrackResult& result = outcome.record.result;
-  if (result.status == tracking::TrackStatus::kTracking && std::ranges::any_of(result.cameras, contradicts_pose)) {
+  if (result.status == tracking::TrackStatus::kTracking &&
+      std::ranges::any_of(result.cameras, tracking::contradicts_pose)) {
     result.status = tracking::TrackStatus::kLost;
     result.reason = tracking::LostReason::kUnstablePose;
   }

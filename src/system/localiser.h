@@ -15,11 +15,6 @@
 
 namespace bslam::system {
 
-// Returns true if hardly any of the landmarks in view of a camera, or significantly less than half of many, are found
-// where the pose of the frame predicts them. This indicates images under the names of other cameras, or another rig. A
-// run would detect it in the following frames; here there is only one frame.
-bool contradicts_pose(const tracking::CameraCounts& camera);
-
 // Holds one copy of the map and of the index of places, which all threads share. All functions are thread-safe.
 class Localiser {
  public:

@@ -4,6 +4,7 @@
 
 #include "base/assert.h"
 #include "base/stopwatch.h"
+#include "tracking/camera_evidence.h"
 
 namespace bslam::system {
 namespace {
@@ -15,39 +16,15 @@ execution::JournalStep journal_step(tracking::ProposedEdit::Kind kind) {
                                                          : execution::JournalStep::kStart;
 }
 
-// Observations about each camera after the frame was tracked.
-std::vector<tracking::CameraEvidence> evidence(const image::ImageBundle& images, const tracking::ImageFaults& faults,
-                                               const tracking::FramePlan& plan, const Pipeline::Outcome& outcome) {
-  std::vector<tracking::CameraEvidence> out;
-  const tracking::FrameRecord& record = outcome.record;
-  for (std::size_t c = 0; c < images.images.size(); ++c) {
-    // If a keyframe was created from an earlier frame in which the camera had an image, its features are better
-    // evidence than the landmarks that direct tracking searched for.
-    const bool of_keyframe = c < outcome.created_cameras.size() && outcome.created_cameras[c].keypoints > 0;
-    const tracking::CameraCounts& counts = of_keyframe ? outcome.created_cameras[c] : record.result.cameras[c];
-    out.push_back({.image = images.images[c].state,
-                   .outage = faults.outage[c],
-                   .blurred = faults.blurred[c] != 0,
-                   .inconsistent = record.result.cameras[c].excluded,
-                   .postponed = plan.postponed[c] != 0,
-                   .extracted = of_keyframe || !record.direct ? std::optional(counts.keypoints) : std::nullopt,
-                   .keypoints = counts.keypoints,
-                   .inliers = counts.inliers});
-  }
-  return out;
-}
-
 }  // namespace
 
 Pipeline::Pipeline(const camera::Rig& rig, CamerasOfRun cameras, const Config& config, std::vector<image::Image> masks,
                    std::unique_ptr<tracking::Relocaliser> relocaliser, KeyframeMaker* keyframe_maker)
-    : given_(rig),
-      rig_(std::make_shared<const camera::Rig>(rig)),
-      config_(config),
+    : config_(config),
       pool_(config.execution.threads_for(cameras.size)),
       monitor_(rig.size(), config.health),
       status_(rig.size()),
-      builder_(rig.size(), config.features, std::move(masks)),
+      preparation_(rig, config, std::move(masks), pool_),
       tracker_(rig, tracker_options(config, cameras), pool_, std::move(relocaliser)),
       keyframe_maker_(keyframe_maker) {}
 
@@ -71,7 +48,8 @@ Pipeline::Outcome Pipeline::process(const image::ImageBundle& images, execution:
   FrameRecord& record = outcome.record;
   record.stages.insert(record.stages.begin(), stages.begin(), stages.end());
   record.reduction = state_.reduction;
-  record.cameras = status_.update(evidence(images, faults, plan, outcome));
+  record.cameras =
+      status_.update(tracking::camera_evidence(images, faults, plan.postponed, record, outcome.created_cameras));
   for (const image::CameraImage& i : images.images) record.images.push_back(i.state);
   record.frame_ms = whole.ms();
   return outcome;
@@ -92,24 +70,24 @@ tracking::TrackOutcome Pipeline::track(const image::ImageBundle& images, const t
     stages.push_back({stage, watch.ms()});
     watch = Stopwatch();
   };
-  BundledFrame frame = begin(images, plan);
+  BundledFrame frame = preparation_.begin(images, plan);
   end_stage("pyramids");
   const auto add_features = [&] {
-    builder_.extract(*rig_, frame, pool_, plan.budgets);
+    preparation_.extract(plan, frame);
     end_stage("extract");
-    frame = bundle(plan, frame);
+    preparation_.bundle(plan, frame);
     end_stage("bundle");
   };
   const bool directly = tracker_.tracks_directly(state_);
   if (!directly) add_features();
   outcome.seen = executor.begin_frame(frame.id);
-  const bool recalibrated = adopt_rig(*outcome.seen, frame);
+  const bool recalibrated = preparation_.adopt_rig(*outcome.seen, frame);
   const auto created = adopt_keyframe(outcome);
   if (config_.mode != execution::Mode::kSequential) end_stage("results");
 
   tracking::DirectAttempt direct;
   if (directly) {
-    direct = tracker_.process_directly(state_, frame, {builder_.pyramids(), builder_.masks()}, outcome.seen);
+    direct = tracker_.process_directly(state_, frame, preparation_.images(), outcome.seen);
     if (direct.failure != tracking::DirectFailure::kNone) {
       end_stage("align");
       add_features();
@@ -118,7 +96,8 @@ tracking::TrackOutcome Pipeline::track(const image::ImageBundle& images, const t
   tracking::TrackOutcome found =
       direct.failure == tracking::DirectFailure::kNone
           ? *std::move(direct.outcome)
-          : tracker_.process(std::move(state_), std::move(frame), builder_.pyramids(), outcome.seen, std::move(direct));
+          : tracker_.process(std::move(state_), std::move(frame), preparation_.images().pyramids, outcome.seen,
+                             std::move(direct));
   found.record.recalibrated = recalibrated;
   found.record.created = created;
   if (found.keyframe_wanted) outcome.deferred = defer_keyframe(plan, std::move(frame), found);
@@ -126,21 +105,20 @@ tracking::TrackOutcome Pipeline::track(const image::ImageBundle& images, const t
 }
 
 // Commits the correction of the rig that a frame gave before a map was started, and bundles and processes the features
-// of the frame again.
+// of the frame again. The tracker does not propose another one for the same frame.
 tracking::TrackOutcome Pipeline::track_with_corrected_rig(const image::ImageBundle& images,
                                                           const tracking::FramePlan& plan,
                                                           tracking::TrackOutcome&& tracked,
                                                           execution::StageExecutor& executor, Outcome& outcome) {
   const Stopwatch watch;
   outcome.seen = executor.commit(execution::JournalStep::kStart, std::move(tracked.edit->draft)).published;
-  rig_ = outcome.seen->shared_rig();
-  BundledFrame frame = begin(images, plan);
-  builder_.extract(*rig_, frame, pool_, plan.budgets);
-  frame = bundle(plan, frame);
+  preparation_.set_rig(outcome.seen->shared_rig());
+  BundledFrame frame = preparation_.begin(images, plan);
+  preparation_.extract(plan, frame);
+  preparation_.bundle(plan, frame);
   const double corrected_ms = tracked.record.stages.back().ms + watch.ms();
   tracking::TrackOutcome again =
-      tracker_.process(std::move(tracked.next), std::move(frame), builder_.pyramids(), outcome.seen);
-  if (again.edit && again.edit->kind == tracking::ProposedEdit::Kind::kRig) again.edit.reset();
+      tracker_.process(std::move(tracked.next), std::move(frame), preparation_.images().pyramids, outcome.seen);
   again.record.recalibrated = true;
   again.record.stages.insert(again.record.stages.begin(), {"correct rig", corrected_ms});
   return again;
@@ -152,7 +130,8 @@ FrameId Pipeline::defer_keyframe(const tracking::FramePlan& plan, BundledFrame f
   BSLAM_ASSERT(keyframe_maker_ != nullptr, "no keyframes are created while localising");
   const FrameId id = frame.id;
   tracking::KeyframeRequest request{std::move(frame), std::move(state_), found.record.result.anchored};
-  keyframe_maker_->request({std::move(request), builder_.release(), plan.budgets, plan.alignment, rig_});
+  keyframe_maker_->request(
+      {std::move(request), preparation_.release(), plan.budgets, plan.alignment, preparation_.rig()});
   return id;
 }
 
@@ -165,14 +144,6 @@ std::optional<tracking::CreatedKeyframe> Pipeline::adopt_keyframe(Outcome& outco
   return created;
 }
 
-// Continues with the rig of the map. Returns true if a stage has replaced it since the last frame.
-bool Pipeline::adopt_rig(const map::BundledMap& map, BundledFrame& frame) {
-  if (map.shared_rig() == rig_) return false;
-  if (frame::changes_frames(*rig_, map.rig())) frame = frame::recalibrated(std::move(frame), *rig_, map.rig());
-  rig_ = map.shared_rig();
-  return true;
-}
-
 void Pipeline::commit(tracking::TrackOutcome& tracked, execution::StageExecutor& executor, Outcome& outcome) {
   const Stopwatch watch;
   tracking::ProposedEdit& edit = *tracked.edit;
@@ -182,22 +153,6 @@ void Pipeline::commit(tracking::TrackOutcome& tracked, execution::StageExecutor&
   outcome.keyframes = report.keyframes;
   outcome.started_submap = edit.kind == tracking::ProposedEdit::Kind::kStart;
   tracked.record.stages.back().ms += watch.ms();  // added to the time of the stage that proposed the edit
-}
-
-BundledFrame Pipeline::begin(const image::ImageBundle& images, const tracking::FramePlan& plan) {
-  BundledFrame frame = builder_.begin(images, pool_, plan.skipped);
-  frame.twist = plan.twist;
-  for (std::size_t c = 0; c < frame.cameras.size(); ++c) {
-    const TimeNs correction = rig_->camera(c).time_offset_ns - given_.camera(c).time_offset_ns;
-    TimeNs& time_ns = frame.cameras[c].time_ns;
-    time_ns = config_.tracking.use_capture_times ? time_ns + correction : frame.time_ns;
-  }
-  return frame;
-}
-
-BundledFrame Pipeline::bundle(const tracking::FramePlan& plan, const BundledFrame& frame) {
-  return matching::bundle(frame::rig_of(*rig_, frame), frame, builder_.pyramids(), config_.bundling, plan.alignment,
-                          pool_);
 }
 
 }  // namespace bslam::system

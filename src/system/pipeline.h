@@ -7,8 +7,8 @@
 
 #include "base/thread_pool.h"
 #include "execution/stage_executor.h"
-#include "matching/frame_builder.h"
 #include "system/config.h"
+#include "system/frame_preparation.h"
 #include "system/keyframe_maker.h"
 #include "tracking/tracker.h"
 
@@ -51,34 +51,28 @@ class Pipeline {
   void set_reduction(int level);
   int reduction() const { return state_.reduction; }
 
-  tracking::TrackStatus status() const { return state_.track.status; }
   const tracking::Tracker& tracker() const { return tracker_; }
 
   // Memory of the image pyramids of the last frame, and of the relocaliser's index of keyframes, in bytes.
-  std::size_t pyramid_bytes() const { return builder_.memory_bytes(); }
+  std::size_t pyramid_bytes() const { return preparation_.memory_bytes(); }
   std::size_t place_index_bytes() const { return tracker_.place_index_bytes(); }
 
  private:
   tracking::TrackOutcome track(const image::ImageBundle& images, const tracking::FramePlan& plan,
                                execution::StageExecutor& executor, Outcome& outcome, std::vector<StageTime>& stages);
-  frame::BundledFrame begin(const image::ImageBundle& images, const tracking::FramePlan& plan);
-  frame::BundledFrame bundle(const tracking::FramePlan& plan, const frame::BundledFrame& frame);
   FrameId defer_keyframe(const tracking::FramePlan& plan, frame::BundledFrame frame,
                          const tracking::TrackOutcome& found);
   std::optional<tracking::CreatedKeyframe> adopt_keyframe(Outcome& outcome);
-  bool adopt_rig(const map::BundledMap& map, frame::BundledFrame& frame);
   tracking::TrackOutcome track_with_corrected_rig(const image::ImageBundle& images, const tracking::FramePlan& plan,
                                                   tracking::TrackOutcome&& tracked, execution::StageExecutor& executor,
                                                   Outcome& outcome);
   void commit(tracking::TrackOutcome& tracked, execution::StageExecutor& executor, Outcome& outcome);
 
-  const camera::Rig given_;  // the rig as given; its time offsets are included in the capture times of the images
-  std::shared_ptr<const camera::Rig> rig_;  // rig of the map in which the last frame was tracked
   const Config& config_;
   ThreadPool pool_;
   tracking::CameraMonitor monitor_;
   tracking::CameraStatusMonitor status_;
-  matching::FrameBuilder builder_;
+  FramePreparation preparation_;
   tracking::Tracker tracker_;
   tracking::FrontEndState state_;
   KeyframeMaker* const keyframe_maker_;  // may be null

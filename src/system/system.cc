@@ -14,30 +14,6 @@
 namespace bslam::system {
 namespace {
 
-// Maximum number of keyframes of a map without metric scale that is discarded if tracking is lost, and of a map that is
-// discarded if the cameras that determine its scale contradict it, or its poses are undecided.
-constexpr std::size_t kMaxFailedMap = 4, kMaxContradictedMap = 8;
-// Maximum age of such a map, in seconds. A rig that hardly moves adds few keyframes, but a map that has agreed with the
-// images for longer is right.
-constexpr double kMaxFailedAge_s = 3.0;
-// After this number of such maps the contradicting cameras are assumed to be wrong instead, and undecided poses to be
-// right.
-constexpr int kMaxContradictions = 3;
-
-// Returns true if the frame is lost although it has features: the map may be wrong.
-bool disowns_map(const tracking::TrackResult& result) {
-  using tracking::LostReason;
-  return result.reason == LostReason::kFewMatches || result.reason == LostReason::kFewInliers ||
-         result.reason == LostReason::kUnstablePose;
-}
-
-bool overlaps_any(const camera::Rig& rig, std::size_t camera) {
-  for (std::size_t other = 0; other < rig.size(); ++other) {
-    if (rig.overlap(camera, other) || rig.overlap(other, camera)) return true;
-  }
-  return false;
-}
-
 map::BundledMap empty_map(const camera::Rig& rig, const camera::Rig& given, const Config& config) {
   map::BundledMap map(std::make_shared<const camera::Rig>(rig), config.feature_model().pyramid);
   map.set_given_rig(std::make_shared<const camera::Rig>(given));
@@ -58,10 +34,7 @@ CamerasOfRun find_cameras(std::optional<map::BundledMap>& map, const camera::Rig
 
 // If the map has cameras of other rigs, their calibration is constant.
 Config config_for(Config config, std::size_t cameras_of_run, const camera::Rig& rig) {
-  if (cameras_of_run == rig.size()) return config;
-  config.calibration.refine = calibration::Refine::kFalse;
-  config.calibration.check = false;
-  return config;
+  return cameras_of_run == rig.size() ? config : without_calibration(std::move(config));
 }
 
 }  // namespace
@@ -71,9 +44,8 @@ System::System(camera::Rig rig, Config config, Resources resources)
       rig_(resources.map ? map::with_cameras(resources.map->given_rig(), cameras_.first, rig) : rig),
       run_rig_(std::move(rig)),
       config_(config_for(std::move(config), cameras_.size, rig_)),
-      loaded_(resources.map.has_value()),
-      first_keyframe_(loaded_ ? resources.map->keyframe_slots() : 0),
-      first_of_map_(first_keyframe_),
+      first_keyframe_(resources.map ? resources.map->keyframe_slots() : 0),
+      doubt_(resources.map ? std::nullopt : std::optional<tracking::MapDoubt>(run_rig_)),
       closer_(make_loop_closer(config_, resources.vocabulary)),
       keyframe_maker_(rig_, config_, make_relocaliser(resources.vocabulary, config_),
                       [this](const tracking::CreatedKeyframe& created, TimeNs time_ns) { note(created, time_ns); }),
@@ -111,7 +83,6 @@ void System::discard_map() {
     record.keyframe = false;
   }
   early_.clear();
-  map_started_ns_.reset();
   pipeline_.restart();
   executor_->restart();
   {
@@ -119,7 +90,6 @@ void System::discard_map() {
     created_.clear();
   }
   created_keyframes_.clear();
-  first_of_map_ = KeyframeId(store_.snapshot()->keyframe_slots());
   frames_.back().map_withdrawn = true;
 }
 
@@ -132,7 +102,6 @@ void System::set_keyframe_time(KeyframeId k, TimeNs time_ns) {
 Result<FrameRecord> System::process(const image::ImageBundle& images) {
   if (const Status valid = check_frame(images, run_rig_, last_input_); !valid) return valid.error();
   last_input_ = FrameStamp{images.id, images.time_ns};
-  const bool had_pose = pipeline_.status() != tracking::TrackStatus::kNotStarted;
   const bool whole = cameras_.size == rig_.size();
   Pipeline::Outcome outcome = whole ? pipeline_.process(images, *executor_)
                                     : pipeline_.process(widened(images, cameras_, rig_.size()), *executor_);
@@ -150,14 +119,10 @@ Result<FrameRecord> System::process(const image::ImageBundle& images) {
     outcome.record.stages.push_back({"wait", watch.ms()});
     outcome.record.frame_ms += watch.ms();
   }
-  const bool disowned = had_pose && map_disowned(outcome);
-  const bool contradicted = had_pose && !disowned && map_contradicted(outcome);
-  if (outcome.record.result.status == tracking::TrackStatus::kTracking && !map_started_ns_)
-    map_started_ns_ = outcome.record.result.time_ns;
+  const bool wrong_map = doubt_ && doubt_->update(outcome.record, *outcome.seen);
   frames_.push_back(std::move(outcome.record));
   mark_created_keyframes();
-  contradictions_ += contradicted;
-  if (disowned || contradicted) discard_map();
+  if (wrong_map) discard_map();
   FrameRecord record = frames_.back();
   bound_history();
   return record;
@@ -199,51 +164,6 @@ void System::mark_created_keyframes() {
     record->result.anchored = {.reference = created.keyframe, .T_rig_reference = geometry::SE3()};
     created_keyframes_.push_back(*record);
   }
-}
-
-// Returns true if the cameras that overlap with others contradict the map, and only cameras without overlap agree with
-// it. Cameras without overlap are consistent with any scale, so that they must not outvote those that determine it.
-bool System::scale_contradicted(const tracking::TrackResult& result) const {
-  if (result.status != tracking::TrackStatus::kTracking) return false;
-  bool contradicted = false;
-  for (std::size_t c = 0; c < result.cameras.size(); ++c) {
-    if (!overlaps_any(run_rig_, c)) continue;
-    if (!result.cameras[c].excluded && result.cameras[c].inliers > 0) return false;
-    contradicted |= result.cameras[c].excluded;
-  }
-  return contradicted;
-}
-
-// Returns true if many poses up to this frame were undecided: those of a new map may be relative to a moving object.
-bool System::undecided(const tracking::TrackResult& result) const {
-  if (!result.contest.undecided) return false;
-  std::size_t frames = 1;
-  for (const FrameRecord& before : std::views::reverse(frames_)) {
-    if (to_seconds(result.time_ns - before.result.time_ns) > tracking::kContestedWithin_s) break;
-    frames += before.result.status == tracking::TrackStatus::kTracking && before.result.contest.undecided;
-  }
-  return frames >= tracking::kContestedFrames;
-}
-
-// Returns true if the map consists of at most this number of keyframes and was started recently.
-bool System::map_is_new(const Pipeline::Outcome& outcome, std::size_t max_keyframes) const {
-  if (loaded_ || !map_started_ns_) return false;
-  const double age_s = to_seconds(outcome.record.result.time_ns - *map_started_ns_);
-  return age_s <= kMaxFailedAge_s && outcome.seen->keyframe_slots() - first_of_map_.index() <= max_keyframes;
-}
-
-// Returns true if a recent monocular initialisation was wrong: the frames after it are lost.
-bool System::map_disowned(const Pipeline::Outcome& outcome) const {
-  return outcome.seen->scale() != map::Scale::kMetric && disowns_map(outcome.record.result) &&
-         map_is_new(outcome, kMaxFailedMap);
-}
-
-// Returns true if a recent initialisation was wrong, because most of its points were on a moving object: the cameras
-// that determine the scale contradict it, or the landmarks support two motions.
-bool System::map_contradicted(const Pipeline::Outcome& outcome) const {
-  if (contradictions_ >= kMaxContradictions || !map_is_new(outcome, kMaxContradictedMap)) return false;
-  const bool metric = outcome.seen->scale() == map::Scale::kMetric;
-  return (metric && scale_contradicted(outcome.record.result)) || undecided(outcome.record.result);
 }
 
 // Drops the oldest records once there are twice as many as configured, so that the mean time per frame is constant.

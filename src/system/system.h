@@ -19,6 +19,7 @@
 #include "system/input_check.h"
 #include "system/pipeline.h"
 #include "system/stages.h"
+#include "tracking/map_doubt.h"
 
 namespace bslam::system {
 
@@ -125,11 +126,6 @@ class System {
   std::vector<SubmapTrajectory> live_trajectories() const;
 
  private:
-  bool scale_contradicted(const tracking::TrackResult& result) const;
-  bool undecided(const tracking::TrackResult& result) const;
-  bool map_is_new(const Pipeline::Outcome& outcome, std::size_t max_keyframes) const;
-  bool map_disowned(const Pipeline::Outcome& outcome) const;
-  bool map_contradicted(const Pipeline::Outcome& outcome) const;
   void discard_map();
   void bound_history();
   void locate_early_frames();
@@ -144,11 +140,8 @@ class System {
   const camera::Rig rig_;       // rig of the map, with the given calibration
   const camera::Rig run_rig_;   // rig of the run, as given
   const Config config_;
-  const bool loaded_;                                  // whether the run began with a loaded map
   const KeyframeId first_keyframe_;                    // first keyframe of this run
-  KeyframeId first_of_map_;                            // first keyframe after the last discarded map
-  std::optional<TimeNs> map_started_ns_;               // time of the first pose after the last discarded map
-  int contradictions_ = 0;                             // number of maps discarded because they were contradicted
+  std::optional<tracking::MapDoubt> doubt_;            // nullopt: the map was loaded and is never discarded
   const std::shared_ptr<looping::LoopCloser> closer_;  // null: no loops are closed
   KeyframeMaker keyframe_maker_;
   Pipeline pipeline_;

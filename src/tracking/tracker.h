@@ -84,7 +84,7 @@ struct FrontEndState {
 
 // An edit of the map that tracking proposes.
 struct ProposedEdit {
-  // kRig: another calibration of the rig, with which the frame is to be processed again.
+  // kRig: another calibration of the rig, with which the frame is to be processed again. It is not proposed then.
   enum class Kind { kStart, kKeyframe, kRig };
   Kind kind = Kind::kKeyframe;
   map::MapDraft draft;

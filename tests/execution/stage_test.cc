@@ -29,6 +29,11 @@ TEST(Stage, OnlyAResultThatWillBeCommittedSupersedesOthers) {
   EXPECT_EQ(superseded(Stage::kLoop, correction), none);  // its commit will be rejected
 }
 
+TEST(Stage, CalibrationsAndAdjustmentsCanBeSuperseded) {
+  for (const Stage stage : kStages)
+    EXPECT_EQ(can_be_superseded(stage), stage == Stage::kCalibrate || stage == Stage::kGlobal) << stage_name(stage);
+}
+
 TEST(Stage, FramesAwaitTheFirstCalibrations) {
   const StageWorld world;
   map::BundledMap empty = world.empty_map();

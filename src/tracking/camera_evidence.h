@@ -1,0 +1,21 @@
+// Collects the observations about the cameras of a frame from which their status is determined.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "image/image_bundle.h"
+#include "tracking/camera_health.h"
+#include "tracking/camera_status.h"
+#include "tracking/frame_record.h"
+
+namespace bslam::tracking {
+
+// Observations about each camera after a frame was tracked; all arguments have one entry per camera. `postponed`: see
+// FramePlan. `created`: feature counts of the keyframe in FrameRecord::created; empty without one.
+std::vector<CameraEvidence> camera_evidence(const image::ImageBundle& images, const ImageFaults& faults,
+                                            std::span<const std::uint8_t> postponed, const FrameRecord& record,
+                                            std::span<const CameraCounts> created);
+
+}  // namespace bslam::tracking
