@@ -66,7 +66,7 @@ struct Startup {
   // words, so that no rig can be found in it later. A map cannot be continued without place recognition.
   bool place_recognition = true;
   // Minimum number of latest frames that trajectory() returns. Older frames are discarded, so that memory grows with
-  // the map only. 0: all frames are kept. At least five are, since tracking uses them.
+  // the map only. 0: all frames are kept.
   std::size_t history_frames = 0;
   Callbacks callbacks = {};
 };

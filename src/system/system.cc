@@ -51,7 +51,7 @@ System::System(camera::Rig rig, Config config, Resources resources)
                       [this](const tracking::CreatedKeyframe& created, TimeNs time_ns) { note(created, time_ns); }),
       pipeline_(rig_, cameras_, config_, widened(std::move(resources.masks), cameras_, rig_.size()),
                 make_relocaliser(resources.vocabulary, config_), &keyframe_maker_),
-      history_(resources.history > 0 ? std::max(resources.history, tracking::kContestedFrames) : 0),
+      history_(resources.history),
       store_(resources.map ? std::move(*resources.map)
                            : empty_map(resources.initial_rig.value_or(rig_), rig_, config_)),
       initial_rig_(store_.snapshot()->shared_rig()),

@@ -321,14 +321,6 @@ TEST_F(PublicSystem, WarnsOfFormerNamesOfSettings) {
   EXPECT_TRUE(warnings[1].starts_with("setting 'mapping.culling.min_found_share' is now called '")) << warnings[1];
 }
 
-// Tracking looks at the frames of the last second.
-TEST_F(PublicSystem, KeepsTheFramesThatTrackingNeedsInTheShortestHistory) {
-  auto system = make_system({.history_frames = 1});
-  process(system, 0, kFrames);
-  ASSERT_TRUE(system.finish());
-  EXPECT_GE(system.trajectory().value().size(), 5u);
-}
-
 // Images with padded rows give the same results as packed images.
 TEST_F(PublicSystem, ReadsImagesWithAnyStride) {
   auto borrowed = make_system(), packed = make_system();
