@@ -18,40 +18,12 @@
 #include "dataset/live_recording.h"
 #include "dataset/recording_description.h"
 #include "dataset/rosbag2_folder.h"
+#include "dataset/topic_names.h"
 
 namespace bslam::dataset {
 namespace {
 
 namespace fs = std::filesystem;
-
-// "/cam0/image_raw/compressed" -> "/cam0/image_raw", the topic of which it is a copy.
-std::string without_transport(std::string topic) {
-  constexpr std::string_view kTransport = "/compressed";
-  if (topic.ends_with(kTransport)) topic.resize(topic.size() - kTransport.size());
-  return topic;
-}
-
-// "/cam0/image_raw/compressed" -> "/cam0", where the calibration of its camera is as well.
-std::string namespace_of(std::string topic) {
-  topic = without_transport(std::move(topic));
-  const std::size_t slash = topic.rfind('/');
-  return slash == std::string::npos ? "" : topic.substr(0, slash);
-}
-
-// "/stereo/left/image_raw" -> "stereo_left"; "/image" -> "image".
-std::string camera_name(const std::string& topic) {
-  std::string name = namespace_of(topic);
-  if (name.empty()) name = topic;
-  name.erase(0, name.find_first_not_of('/') == std::string::npos ? name.size() : name.find_first_not_of('/'));
-  std::ranges::replace(name, '/', '_');
-  return name.empty() ? "camera" : name;
-}
-
-// Returns true if images of this topic are rectified, so that P describes them instead of K and D.
-bool is_rectified(const std::string& topic) {
-  const std::string last = topic.substr(namespace_of(topic).size());
-  return last.starts_with("/image_rect") && !last.starts_with("/image_rect_raw");
-}
 
 bool has_header_stamps(const ImageTopic& topic) {
   return std::ranges::any_of(topic.images, [](const BagImage& image) { return image.stamp_ns != 0; });
@@ -97,6 +69,12 @@ class BagRecording : public Recording {
   }
   Result<image_files::ImageList> images(std::size_t camera) const override;
   bool has_times() const override { return true; }
+  std::vector<std::string> names_in_topics() const override;
+  std::vector<std::string> topics() const override {
+    std::vector<std::string> out;
+    for (const std::size_t t : cameras_) out.push_back(topics_[t].name);
+    return has_order() ? std::vector<std::string>() : out;
+  }
   std::vector<std::string> warnings() const override { return warnings_; }
   RecordingDescription describe() const override;
 
@@ -110,6 +88,11 @@ class BagRecording : public Recording {
   bool is_calibrated(const std::string& topic) const {
     return (live_ && live_->camera_of(topic) != nullptr) || calibration_of(topic).has_value();
   }
+  // Returns true if the order of the topics was requested, or recorded with the rig.
+  bool has_order() const {
+    const auto is_listed = [&](std::size_t t) { return std::ranges::count(live_->topics, topics_[t].name) > 0; };
+    return !proposed_ || (live_ && std::ranges::all_of(cameras_, is_listed));
+  }
   Status choose_requested(const std::vector<std::string>& requested, const std::string& path);
   std::optional<geometry::SE3> body_from_cam(std::size_t camera) const;
   std::string name_of(std::size_t camera) const;
@@ -118,7 +101,7 @@ class BagRecording : public Recording {
 
   std::shared_ptr<BagStore> store_;
   std::vector<std::string> warnings_;
-  std::vector<ImageTopic> topics_;    // by name
+  std::vector<ImageTopic> topics_;    // in the natural order of their names
   std::vector<std::size_t> cameras_;  // the topics of the cameras
   std::optional<LiveRecording> live_;
   bool proposed_ = true;  // the topics were not requested
@@ -182,6 +165,16 @@ Status BagRecording::choose_requested(const std::vector<std::string>& requested,
     cameras_.push_back(index);
   }
   return {};
+}
+
+std::vector<std::string> BagRecording::names_in_topics() const {
+  std::vector<std::string> names;
+  for (const std::string& topic : topics()) names.push_back(camera_name(topic));
+  std::vector<std::string> out = names;
+  for (std::string& name : out) {
+    if (std::ranges::count(names, name) > 1) name.clear();
+  }
+  return out;
 }
 
 // At most two cameras have a calibration here (body_from_cam), so that a number identifies them.

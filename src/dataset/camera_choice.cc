@@ -60,6 +60,13 @@ Error unknown_order(const DatasetRequest& request, const Recording& recording, c
                       origin_of(request), names_of(rig))};
 }
 
+// More topics of images than cameras: some are those of other cameras, and their names do not tell which.
+Error unknown_topics(const DatasetRequest& request, const std::vector<std::string>& topics, const camera::Rig& rig) {
+  return {request.path.string(), "", fmt::format("image topics {}", fmt::join(topics, ", ")),
+          fmt::format("those of the {} cameras of {} ({}): name the topics in their order with --topics", rig.size(),
+                      origin_of(request), names_of(rig))};
+}
+
 // Returns nullopt if the calibration of any camera cannot be read.
 std::optional<camera::Rig> whole_rig(const Recording& recording) {
   std::vector<camera::RigCamera> cameras;
@@ -104,11 +111,15 @@ Result<RecordedCameras> recorded_cameras(const DatasetRequest& request, const Re
                                          const camera::Rig& rig, const std::vector<int>& cameras) {
   const std::vector<std::string> folders =
       request.topics.empty() ? recording.folder_names() : std::vector<std::string>();
+  const std::vector<std::string> topics = recording.topics();
   std::vector<int> all(rig.size());
   std::iota(all.begin(), all.end(), 0);
   const auto is_found = [](int folder) { return folder >= 0; };
-  const std::vector<int> found = folders_by_name(folders, rig, cameras);
-  if (!folders.empty() && std::ranges::all_of(found, is_found)) return RecordedCameras{found, true};
+  for (const std::vector<std::string>& names : {folders, recording.names_in_topics()}) {
+    const std::vector<int> found = folders_by_name(names, rig, cameras);
+    if (!names.empty() && std::ranges::all_of(found, is_found)) return RecordedCameras{found, true};
+  }
+  if (topics.size() > rig.size()) return unknown_topics(request, topics, rig);
   if (are_those_selected(request, recording, cameras)) {
     all.resize(cameras.size());
     return RecordedCameras{all, false};

@@ -31,10 +31,10 @@ struct RecordedCameras {
   bool by_name = false;
 };
 
-// Finds `cameras` of a rig in a recording: folders with the names of the cameras, or else the folders in their order.
+// Finds `cameras` of a rig in a recording: folders or topics with the names of the cameras, or else in their order.
 // If cameras are selected, the number of folders may also equal the number of selected cameras, if there is one folder
 // or the folders are requested by name. Errors: folders with names of their own of which only some are those of
-// cameras, or which are not as many as the rig has; images of too few cameras.
+// cameras, or which are not as many as the rig has; more topics than the rig has cameras; images of too few cameras.
 Result<RecordedCameras> recorded_cameras(const DatasetRequest& request, const Recording& recording,
                                          const camera::Rig& rig, const std::vector<int>& cameras);
 

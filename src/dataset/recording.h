@@ -40,6 +40,11 @@ class Recording {
   virtual std::vector<std::string> folder_names() const { return {}; }
   // Returns true if the order of the cameras does not follow from these names.
   virtual bool has_own_names() const { return false; }
+  // The same for the topics of a bag: the names of cameras in them ("/cam0/image_raw": cam0; empty if it is not the
+  // only one with that name), and the topics themselves. None if it is no bag, or if their order was requested or
+  // recorded.
+  virtual std::vector<std::string> names_in_topics() const { return {}; }
+  virtual std::vector<std::string> topics() const { return {}; }
   // Messages for the user about damaged or missing parts found when the recording was opened.
   virtual std::vector<std::string> warnings() const { return {}; }
   // Describes the images of the cameras, and what else the recording contains. Warnings and what is missing are added

@@ -153,7 +153,8 @@ std::optional<std::vector<int>> cameras_of_run(const DatasetRequest& request, co
   if (!cameras) return std::nullopt;
   const auto recorded = recorded_cameras(with_rig, recording, *rig, *cameras);
   if (recorded) return recorded->numbers;
-  if (recording.has_own_names()) out.missing.push_back(recorded.error().message());
+  if (recording.has_own_names() || recording.topics().size() > rig->size())
+    out.missing.push_back(recorded.error().message());
   return std::nullopt;
 }
 

@@ -186,6 +186,78 @@ TEST_F(SmallBag, TopicsAreTheCamerasInTheirOrder) {
   EXPECT_EQ(open_dataset(folder).error().file, "--topics");
 }
 
+// A rig of two cameras, whose names are given.
+std::string rig_of(const std::string& first, const std::string& second) {
+  std::string rig = "bslam_rig: 1\ncameras:\n";
+  for (const std::string& name : {first, second}) {
+    rig += "  - name: " + name +
+           "\n    model: pinhole\n    resolution: [32, 24]\n    intrinsics: [20, 20, 15.5, 11.5]\n"
+           "    T_body_cam: [[1, 0, 0, " +
+           (name == first ? "0" : "0.1") + "], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n";
+  }
+  return rig;
+}
+
+// A colour camera and a pair of infrared cameras, of which a rig has two.
+TEST_F(SmallBag, MoreTopicsThanCamerasAreAskedAbout) {
+  const std::string colour = "/camera/color/image_raw", left = "/camera/infra1/image_rect_raw",
+                    right = "/camera/infra2/image_rect_raw";
+  std::vector<TestMessage> all;
+  for (int k = 0; k < support::kSmallFrames; ++k) {
+    int c = 0;
+    for (const std::string& name : {colour, left, right}) {
+      support::TestImage one = image(c > 0 ? c - 1 : 0, k);
+      if (c++ == 0) one.data[0] = static_cast<char>(one.data[0] + 1);
+      all.push_back({name, "sensor_msgs/Image", one.stamp_ns, support::image_message(Wire::kRos1, one)});
+    }
+  }
+  write(all);
+  const fs::path rig = folder_.path() / "rig.yaml";
+  support::write_text(rig, rig_of("left", "right"));
+  DatasetRequest request{.path = bag(), .rig_file = rig};
+  const std::string expected = bag().string() + ": found image topics " + colour + ", " + left + ", " + right +
+                               ", expected those of the 2 cameras of " + rig.string() +
+                               " (left, right): name the topics in their order with --topics";
+  const auto unclear = open_dataset(request);
+  ASSERT_FALSE(unclear);
+  EXPECT_EQ(unclear.error().message(), expected);
+  EXPECT_EQ(describe_recording(request)->refusal, expected);
+  request.cameras = {0};
+  EXPECT_FALSE(open_dataset(request));
+  request.cameras = {};
+  request.topics = {left, right};
+  const auto named = open_dataset(request);
+  ASSERT_TRUE(named) << named.error().message();
+  EXPECT_EQ(named->sources, (std::vector<std::string>{left, right}));
+}
+
+TEST_F(SmallBag, TopicsWithTheNamesOfTheCamerasAreFoundByThem) {
+  std::vector<TestMessage> all = messages(Wire::kRos1);
+  for (int k = 0; k < support::kSmallFrames; ++k) {
+    support::TestImage one = image(0, k);
+    one.data[0] = static_cast<char>(one.data[0] + 1);
+    all.push_back({"/cam/image_raw", "sensor_msgs/Image", one.stamp_ns, support::image_message(Wire::kRos1, one)});
+  }
+  write(all);
+  const fs::path rig = folder_.path() / "rig.yaml";
+  support::write_text(rig, rig_of("cam1", "cam0"));
+  const auto dataset = open_dataset({.path = bag(), .rig_file = rig});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(dataset->sources, (std::vector<std::string>{topic(1), topic(0)}));
+  EXPECT_TRUE(dataset->sources_by_name);
+  EXPECT_TRUE(has(dataset->warnings, "the additional cameras are not used"));
+}
+
+TEST_F(SmallBag, TopicsAreInTheNaturalOrderOfTheirNames) {
+  std::vector<TestMessage> all = messages(Wire::kRos1);
+  for (TestMessage& message : all)
+    message.topic = message.topic == topic(0) ? "/stereo9/image_raw" : "/stereo10/image_raw";
+  write(all);
+  expect_same(request(bag()));
+  EXPECT_EQ(open_dataset(request(bag()))->sources,
+            (std::vector<std::string>{"/stereo9/image_raw", "/stereo10/image_raw"}));
+}
+
 TEST_F(SmallBag, CameraInfoOfAStereoPairIsItsCalibration) {
   auto all = messages(Wire::kRos1);
   add_calibration(all, Wire::kRos1, 20 * 0.11);

@@ -85,6 +85,15 @@ TEST_F(LiveRecordingTest, IsGroupedByTimeWhereItsFramesAreNone) {
   EXPECT_TRUE(swapped->frames[4].images[0].has_value());
 }
 
+// The order of the topics is that of the rig of the run, so that a rig of its first cameras needs no names of topics.
+TEST_F(LiveRecordingTest, HasAnOrderOfItsTopicsForOtherRigs) {
+  write(rig_formats::rig_to_yaml(rig_));
+  support::write_text(folder_.path() / "one.yaml", rig_formats::rig_to_yaml(rig_.subset(std::vector{0})));
+  const auto data = open_dataset({.path = path(), .rig_file = folder_.path() / "one.yaml"});
+  ASSERT_TRUE(data.ok()) << data.error().message();
+  EXPECT_EQ(data->sources, std::vector{kTopics[0]});
+}
+
 TEST_F(LiveRecordingTest, SaysWhyItsRigIsNotUsed) {
   write("bslam_rig: 1\ncameras: 7\n");
   const auto data = open_dataset({.path = path()});
