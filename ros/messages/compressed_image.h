@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <cstring>
 #include <memory>
 #include <opencv2/imgcodecs.hpp>
 #include <string>
@@ -30,12 +31,42 @@ inline bool is_whole_image(const std::vector<std::uint8_t>& data) {
   return jpeg || png;
 }
 
+// The byte order of this computer, in which OpenCV decodes values of 16 bits.
+inline bool is_big_endian() {
+  const std::uint16_t one = 1;
+  unsigned char first_byte = 0;
+  std::memcpy(&first_byte, &one, 1);
+  return first_byte == 0;
+}
+
+// The colour filter of a file with one channel, such as "bayer_rggb"; empty if it has none. A format is that of the
+// camera's images and, after `compressed`, that of the file if it differs: "bayer_rggb8; jpeg compressed " has a
+// filter, and "bayer_rggb8; jpeg compressed bgr8" has none.
+inline std::string colour_filter(const std::string& format) {
+  const std::string compressed = "compressed", filter = "bayer_";
+  const std::size_t end = format.find(';'), at = format.find(compressed);
+  if (format.compare(0, filter.size(), filter) != 0 || end == std::string::npos) return "";
+  const std::size_t file =
+      at == std::string::npos ? std::string::npos : format.find_first_not_of(' ', at + compressed.size());
+  if (file != std::string::npos && format.compare(file, filter.size(), filter) != 0) return "";
+  return format.substr(0, std::min(end, format.find_first_of("0123456789")));
+}
+
 // Decodes an image as it is stored: a rotation in the metadata does not turn it, as the calibration is that of the
-// camera. Errors: data that is not an image, or only a part of one.
+// camera. The encoding is mono8, or that of a Bayer image if the format names one and the file has one channel. Errors:
+// data that is not an image, or only a part of one.
 inline bslam::Result<RawImage> decode(const std::vector<std::uint8_t>& data, const std::string& format) {
   cv::Mat grey;
+  std::string encoding = colour_filter(format);
   try {
-    if (is_whole_image(data)) grey = cv::imdecode(data, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
+    const bool whole = is_whole_image(data);
+    if (whole && !encoding.empty()) grey = cv::imdecode(data, cv::IMREAD_UNCHANGED);
+    if (!grey.empty() && (grey.type() == CV_8UC1 || grey.type() == CV_16UC1)) {
+      encoding += grey.depth() == CV_8U ? "8" : "16";
+    } else {
+      encoding = "mono8";
+      if (whole) grey = cv::imdecode(data, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
+    }
   } catch (const cv::Exception&) {
     grey.release();
   }
@@ -44,7 +75,8 @@ inline bslam::Result<RawImage> decode(const std::vector<std::uint8_t>& data, con
                         "a complete JPEG or PNG image"};
   const auto owner = std::make_shared<const cv::Mat>(grey);
   RawImage out;
-  out.encoding = "mono8";
+  out.encoding = encoding;
+  out.big_endian = is_big_endian();
   out.width = static_cast<std::size_t>(grey.cols);
   out.height = static_cast<std::size_t>(grey.rows);
   out.step = grey.step;

@@ -49,6 +49,20 @@ const Encoding* find_encoding(std::string_view name) {
   return found == std::end(kEncodings) ? nullptr : &*found;
 }
 
+// The colour filter of a compressed image, whose format is that of the camera's images and, after `compressed`, that of
+// the file if it differs: "bayer_rggb8; jpeg compressed " has a filter, and "bayer_rggb8; jpeg compressed bgr8" has
+// none.
+PixelLayout filter_in(std::string_view format) {
+  constexpr std::string_view kCompressed = "compressed";
+  const std::size_t end = format.find(';'), at = format.find(kCompressed);
+  if (!format.starts_with("bayer_") || end == std::string_view::npos) return PixelLayout::kFile;
+  std::string_view file = at == std::string_view::npos ? "" : format.substr(at + kCompressed.size());
+  file.remove_prefix(std::min(file.find_first_not_of(' '), file.size()));
+  const Encoding* encoding = find_encoding(format.substr(0, end));
+  const bool kept = file.empty() || file.starts_with("bayer_");
+  return kept && encoding != nullptr ? encoding->layout : PixelLayout::kFile;
+}
+
 constexpr std::size_t kBeginning = 512;  // bytes that contain everything before the pixels, unless names are very long
 
 }  // namespace
@@ -147,7 +161,10 @@ Result<StoredImage> BagStore::read(std::int64_t number) const {
   StoredImage out{.bytes = *std::move(bytes),
                   .begin = static_cast<std::size_t>(image->data_at),
                   .size = static_cast<std::size_t>(image->data_size)};
-  if (image->compressed) return out;
+  if (image->compressed) {
+    out.filter = filter_in(image->encoding);
+    return out;
+  }
   const Encoding* encoding = find_encoding(image->encoding);
   if (encoding == nullptr) return Error{name(number), "", "encoding " + image->encoding, "a supported encoding"};
   if (image->width < 1 || image->height < 1 || image->width > kMaxImageSidePx || image->height > kMaxImageSidePx)

@@ -101,7 +101,23 @@ cv::Mat decode_webp(std::string_view bytes) {
   return grey;
 }
 
+bool jpeg_has_colours(std::string_view bytes) {
+  const std::unique_ptr<void, int (*)(tjhandle)> decoder(tjInitDecompress(), tjDestroy);
+  int width = 0, height = 0, subsampling = 0, colours = 0;
+  return decoder &&
+         tjDecompressHeader3(decoder.get(), data(bytes), bytes.size(), &width, &height, &subsampling, &colours) == 0 &&
+         colours != TJCS_GRAY;
+}
+
 }  // namespace
+
+bool has_colours(std::string_view bytes) {
+  constexpr std::size_t kColourType = 25;  // its position in a PNG
+  if (bytes.starts_with("\x89PNG"))
+    return bytes.size() > kColourType && (static_cast<unsigned char>(bytes[kColourType]) & PNG_COLOR_MASK_COLOR) != 0;
+  if (bytes.starts_with("\xff\xd8")) return jpeg_has_colours(bytes);
+  return bytes.starts_with("RIFF") || plain_file_has_colours(bytes);
+}
 
 cv::Mat decode_to_grey(std::string_view bytes) {
   try {

@@ -11,4 +11,7 @@ namespace bslam::image_decoding {
 // orientation tags are ignored. The result is empty if the bytes cannot be decoded.
 cv::Mat decode_to_grey(std::string_view bytes);
 
+// Returns true if a file that can be decoded has colours rather than one channel.
+bool has_colours(std::string_view bytes);
+
 }  // namespace bslam::image_decoding

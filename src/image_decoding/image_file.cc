@@ -129,8 +129,13 @@ Result<image::Image> read_image(const image_files::ImageFile& file, const PixelF
 
 std::optional<image::Image> decode_stored(const image_files::StoredImage& stored, const PixelFormat& format) {
   if (stored.begin > stored.bytes.size() || stored.size > stored.bytes.size() - stored.begin) return std::nullopt;
-  if (stored.layout == image_files::PixelLayout::kFile)
-    return decode_grey(std::string_view(stored.bytes).substr(stored.begin, stored.size), format);
+  if (stored.layout == image_files::PixelLayout::kFile) {
+    const std::string_view file = std::string_view(stored.bytes).substr(stored.begin, stored.size);
+    PixelFormat of_file = format;
+    if (stored.filter != image_files::PixelLayout::kFile && !has_colours(file))
+      of_file.bayer = filter_of(stored.filter, format.bayer);
+    return decode_grey(file, of_file);
+  }
   auto image = grey_of_rows(stored, format.bits);
   const Bayer filter = filter_of(stored.layout, format.bayer);
   if (!image || filter == Bayer::kNone) return image;

@@ -28,8 +28,8 @@ Result<image::Image> read_image(const std::filesystem::path& file, const PixelFo
 // The same from a file or a recording.
 Result<image::Image> read_image(const image_files::ImageFile& image, const PixelFormat& format = {});
 
-// Decodes an image of a recording. The colour filter of its layout takes precedence over that of `format`. Returns
-// nullopt if it is incomplete or damaged.
+// Decodes an image of a recording. The colour filter of its layout, or of a file with one channel, takes precedence
+// over that of `format`. Returns nullopt if it is incomplete or damaged.
 std::optional<image::Image> decode_stored(const image_files::StoredImage& image, const PixelFormat& format = {});
 
 // Returns the number of bits in use in the 16-bit images of a camera: the smallest of 8, 10, 12, 14 and 16 that holds

@@ -164,6 +164,13 @@ std::optional<std::pair<std::uint32_t, std::uint32_t>> size_of_pnm(std::string_v
   return std::pair(*width, *height);
 }
 
+bool plain_file_has_colours(std::string_view bytes) {
+  if (is_pnm(bytes)) return bytes[1] == '6';
+  if (is_tiff(bytes)) return tiff_has_colours(bytes);
+  const auto bmp = bmp_header(bytes);
+  return bmp && bmp->bits > 8;
+}
+
 cv::Mat decode_plain_file(std::string_view bytes) {
   if (is_pnm(bytes)) return decode_pnm(bytes);
   if (bytes.starts_with("BM")) return decode_bmp(bytes);

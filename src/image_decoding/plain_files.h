@@ -24,6 +24,12 @@ cv::Mat decode_tiff(std::string_view bytes);
 // Width and height in the header of a PNM of the kinds above; nullopt for other files.
 std::optional<std::pair<std::uint32_t, std::uint32_t>> size_of_pnm(std::string_view bytes);
 
+// Returns true if the header of a file of these formats says that it has colours.
+bool plain_file_has_colours(std::string_view bytes);
+
+// The same for TIFF.
+bool tiff_has_colours(std::string_view bytes);
+
 // Brightness of an image with 1, 3 (blue, green, red) or 4 channels.
 cv::Mat brightness(const cv::Mat& image);
 

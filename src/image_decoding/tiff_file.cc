@@ -220,6 +220,11 @@ bool read_strip(const TiffBytes& in, const TiffImage& image, std::size_t strip, 
 
 }  // namespace
 
+bool tiff_has_colours(std::string_view bytes) {
+  const auto image = read_fields({bytes, bytes.front() == 'M'});
+  return image && image->samples >= 3;
+}
+
 cv::Mat decode_tiff(std::string_view bytes) {
   const TiffBytes in{bytes, bytes.front() == 'M'};
   const auto image = read_fields(in);

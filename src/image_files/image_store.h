@@ -9,18 +9,20 @@
 
 namespace bslam::image_files {
 
-// kFile: a whole PNG, JPEG or WebP file. All others are rows of pixels. Colour filters are named by the first two
-// pixels of the first and second row; kUyvy and kYuyv have one brightness per pixel, and two colours per two pixels.
+// kFile: a whole image file, such as PNG, JPEG or WebP. All others are rows of pixels. Colour filters are named by the
+// first two pixels of the first and second row; kUyvy and kYuyv have one brightness per pixel, and two colours per two
+// pixels.
 enum class PixelLayout { kFile, kGrey, kRgb, kBgr, kRgba, kBgra, kRggb, kBggr, kGrbg, kGbrg, kUyvy, kYuyv };
 
 struct StoredImage {
   std::string bytes;  // the image is `size` bytes from `begin`
   std::size_t begin = 0, size = 0;
   PixelLayout layout = PixelLayout::kFile;
-  int width = 0, height = 0;  // pixels; 0 for kFile
-  std::size_t step = 0;       // bytes from one row to the next
-  int bytes_per_value = 1;    // 1 or 2
-  bool big_endian = false;    // byte order of values of two bytes
+  int width = 0, height = 0;                // pixels; 0 for kFile
+  std::size_t step = 0;                     // bytes from one row to the next
+  int bytes_per_value = 1;                  // 1 or 2
+  bool big_endian = false;                  // byte order of values of two bytes
+  PixelLayout filter = PixelLayout::kFile;  // colour filter of a file if that has one channel; kFile: none
 };
 
 // Reads images by their number in a recording. May be called from several threads at the same time.

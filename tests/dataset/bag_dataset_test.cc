@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
 
 #include "dataset/camera_info.h"
 #include "dataset/dataset.h"
@@ -419,14 +421,17 @@ TEST_F(SmallBag, TheDescriptionNamesCamerasTimesAndWhatIsMissing) {
   EXPECT_TRUE(folder->missing.empty());
 }
 
-// An image of one encoding, decoded.
+// An image of one encoding, decoded; a compressed one if `step` is 0.
 image::Image decoded(const std::string& encoding, const std::string& data, int step, bool big_endian = false) {
   const support::TemporaryFolder folder;
   std::vector<TestMessage> all;
   for (int k = 0; k < 3; ++k) {
     const TimeNs time_ns = 1'000'000'000 + k * 100'000'000;
     const support::TestImage one{time_ns, 4, 4, static_cast<std::uint32_t>(step), encoding, data, big_endian};
-    all.push_back({"/image", "sensor_msgs/Image", time_ns, support::image_message(Wire::kCdr, one)});
+    if (step == 0)
+      all.push_back({"/image", "sensor_msgs/CompressedImage", time_ns, compressed_image_message(Wire::kCdr, one)});
+    else
+      all.push_back({"/image", "sensor_msgs/Image", time_ns, support::image_message(Wire::kCdr, one)});
   }
   support::write_text(folder.path() / "a.mcap", support::mcap_bytes(all, Wire::kCdr));
   support::write_text(
@@ -469,6 +474,37 @@ TEST(BagImages, DecodesAllEncodings) {
   EXPECT_EQ(decoded("yuv422_yuy2", pairs, 8).row(1)[1], 11);
   EXPECT_EQ(decoded("bayer_rggb8", rows(4, [](int, int) { return 90; }), 4).row(2)[2], 90);
   EXPECT_EQ(decoded("bayer_gbrg16", rows(8, [](int, int) { return 0x50; }), 8).row(2)[2], 0x50);
+}
+
+// Files of one channel contain the pixels behind the filter, of which a format tells the kind.
+TEST(BagImages, InterpolatesTheColourFilterOfCompressedImages) {
+  constexpr int kRed = 200, kGreen = 100, kBlue = 40;
+  const auto file = [](const cv::Mat& pixels, const std::string& extension) {
+    std::vector<std::uint8_t> bytes;
+    cv::imencode(extension, pixels, bytes);
+    return std::string(bytes.begin(), bytes.end());
+  };
+  const double grey = 0.299 * kRed + 0.587 * kGreen + 0.114 * kBlue;
+  cv::Mat raw(4, 4, CV_8UC1);
+  for (int y = 0; y < 4; ++y) {
+    for (int x = 0; x < 4; ++x) {
+      const int rggb = y % 2 == x % 2 ? (x % 2 == 0 ? kRed : kBlue) : kGreen;
+      raw.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(rggb);
+    }
+  }
+  const std::string png = file(raw, ".png"), colours = file(cv::Mat(4, 4, CV_8UC3, cv::Scalar(90, 90, 90)), ".png");
+  for (const char* format : {"bayer_rggb8; png compressed ", "bayer_rggb8; png compressed bayer_rggb8"}) {
+    for (const auto& [x, y] : {std::pair(1, 1), {2, 1}, {1, 2}, {2, 2}})
+      EXPECT_NEAR(decoded(format, png, 0).row(y)[x], grey, 1.5) << format << ", " << x << " " << y;
+  }
+  EXPECT_NEAR(decoded("bayer_rggb8; tiff compressed ", file(raw, ".tiff"), 0).row(1)[1], grey, 1.5);
+  EXPECT_NEAR(decoded("bayer_rggb8; jpeg compressed ", file(cv::Mat(4, 4, CV_8UC1, 90), ".jpg"), 0).row(1)[1], 90, 1);
+  EXPECT_NEAR(decoded("bayer_bggr8; png compressed ", png, 0).row(1)[1], 0.299 * kBlue + 0.587 * kGreen + 0.114 * kRed,
+              1.5);
+  for (const char* format : {"mono8; png compressed ", "png", "bayer_rggb8; png compressed mono8"})
+    EXPECT_EQ(decoded(format, png, 0).row(1)[1], kBlue) << format;
+  for (const char* format : {"bayer_rggb8; png compressed bgr8", "bayer_rggb8; png compressed "})
+    EXPECT_EQ(decoded(format, colours, 0).row(1)[1], 90) << format;
 }
 
 TEST(CameraInfo, ChecksWhatItCannotRepresent) {

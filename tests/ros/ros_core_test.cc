@@ -233,6 +233,47 @@ TEST(RosImages, CompressedImagesThatAreCutOffAreErrors) {
   EXPECT_FALSE(decode(std::vector<std::uint8_t>(50), "jpeg"));
 }
 
+// Files of one channel contain the pixels behind the colour filter that their format names.
+TEST(RosImages, CompressedBayerImagesAreReadAsRawOnes) {
+  cv::Mat raw(40, 60, CV_8UC1);
+  for (int y = 0; y < raw.rows; ++y) {
+    for (int x = 0; x < raw.cols; ++x)
+      raw.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(y % 2 == x % 2 ? (x % 2 == 0 ? 200 : 40) : 100);
+  }
+  const auto png = [](const cv::Mat& image) {
+    std::vector<std::uint8_t> bytes;
+    EXPECT_TRUE(cv::imencode(".png", image, bytes));
+    return bytes;
+  };
+  cv::Mat words;
+  raw.convertTo(words, CV_16U, 16);
+  RawImage same;
+  same.encoding = "bayer_rggb8";
+  same.width = 60;
+  same.height = 40;
+  same.step = raw.step;
+  same.data = raw.data;
+  same.size = raw.total();
+  const auto expected = to_grey(same, 0);
+  ASSERT_TRUE(expected);
+  for (const auto& [image, format, bits] : {std::tuple(raw, "bayer_rggb8; png compressed ", 16),
+                                            {raw, "bayer_rggb8; png compressed bayer_rggb8", 16},
+                                            {words, "bayer_rggb16; png compressed ", 12}}) {
+    const auto decoded = decode(png(image), format);
+    ASSERT_TRUE(decoded) << decoded.error().message();
+    const auto grey = to_grey(*decoded, 0, bits);
+    ASSERT_TRUE(grey) << grey.error().message();
+    for (std::size_t k = 0; k < raw.total(); ++k) ASSERT_EQ(grey->data[k], expected->data[k]) << format << ", " << k;
+  }
+  EXPECT_EQ(decode(png(raw), "bayer_rggb8; png compressed mono8")->encoding, "mono8");
+  EXPECT_EQ(decode(png(raw), "mono8; png compressed ")->encoding, "mono8");
+  EXPECT_EQ(decode(png(raw), "png")->encoding, "mono8");
+  const auto colours = decode(png(cv::Mat(40, 60, CV_8UC3, cv::Scalar(90, 90, 90))), "bayer_rggb8; png compressed ");
+  ASSERT_TRUE(colours) << colours.error().message();
+  EXPECT_EQ(colours->encoding, "mono8");
+  EXPECT_EQ(colours->data[7], 90);
+}
+
 TEST(RosImages, MetadataDoNotTurnCompressedImages) {
   std::vector<std::uint8_t> bytes;
   ASSERT_TRUE(cv::imencode(".jpg", cv::Mat(40, 60, CV_8UC1, cv::Scalar(90)), bytes));
