@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 #include <system_error>
+#include <utility>
 
 #include "base/atomic_file.h"
 #include "containers/message_file.h"
@@ -22,12 +24,22 @@ bool natural_less(const fs::path& a, const fs::path& b) {
   return x.size() != y.size() ? x.size() < y.size() : x < y;
 }
 
+// Recorders that compress whole files add .zstd to their names. Returns the decompressed file beside such a file;
+// nullopt if there is none.
+std::optional<fs::path> decompressed(const fs::path& file) {
+  std::error_code error;
+  if (file.extension() != ".zstd") return std::nullopt;
+  fs::path plain = file.parent_path() / file.stem();
+  return fs::is_regular_file(plain, error) ? std::optional(std::move(plain)) : std::nullopt;
+}
+
 std::vector<fs::path> message_files_in(const fs::path& folder) {
   std::vector<fs::path> files;
   std::error_code error;
   for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
     std::error_code unreadable;
-    if (containers::has_message_file_name(it->path()) && it->is_regular_file(unreadable)) files.push_back(it->path());
+    if (containers::has_message_file_name(it->path()) && it->is_regular_file(unreadable) && !decompressed(it->path()))
+      files.push_back(it->path());
   }
   std::ranges::sort(files, natural_less);
   return files;
@@ -50,6 +62,13 @@ Result<std::vector<std::string>> listed_files(const fs::path& metadata) {
   return names;
 }
 
+// The file of a bag that metadata.yaml lists. Only its name is used, since old versions of rosbag2 wrote absolute paths
+// on the recording machine.
+fs::path file_in(const fs::path& folder, const std::string& name) {
+  const fs::path file = folder / fs::path(name).filename();
+  return decompressed(file).value_or(file);
+}
+
 }  // namespace
 
 Result<BagFiles> files_of_rosbag2(const fs::path& folder) {
@@ -64,8 +83,7 @@ Result<BagFiles> files_of_rosbag2(const fs::path& folder) {
     out.files = present;
   } else {
     for (const std::string& name : *names) {
-      // Only files of the folder: old versions wrote paths of the machine that recorded.
-      const fs::path file = folder / fs::path(name).filename();
+      const fs::path file = file_in(folder, name);
       if (fs::is_regular_file(file, error)) {
         if (std::ranges::find(out.files, file) == out.files.end()) out.files.push_back(file);
       } else {

@@ -140,6 +140,29 @@ TEST_F(SmallBag, Ros2IsReadAsTheFolder) {
   EXPECT_TRUE(has(rest->warnings, "ros2_0.db3 is listed but not there"));
 }
 
+// Recorders that compress whole files list them with the extension .zstd, which `zstd -d` removes.
+TEST_F(SmallBag, DecompressedFilesOfRos2AreFound) {
+  const auto all = messages(Wire::kCdr);
+  const fs::path folder = folder_.path() / "walk", file = folder / "walk_0.db3", packed = folder / "walk_0.db3.zstd";
+  fs::create_directories(folder);
+  support::write_sqlite_bag(file, all);
+  support::write_text(folder / "metadata.yaml",
+                      "rosbag2_bagfile_information:\n  compression_format: zstd\n  compression_mode: FILE\n"
+                      "  relative_file_paths:\n    - walk_0.db3.zstd\n");
+  for (const bool beside : {false, true}) {
+    if (beside) support::write_text(packed, support::compress("zstd", support::read_text(file)));
+    expect_same(request(folder));
+    EXPECT_TRUE(open_dataset(request(folder))->warnings.empty()) << open_dataset(request(folder))->warnings.front();
+  }
+  fs::rename(folder / "metadata.yaml", folder_.path() / "metadata.yaml");
+  EXPECT_TRUE(open_dataset(request(folder))->warnings.empty()) << open_dataset(request(folder))->warnings.front();
+  fs::rename(folder_.path() / "metadata.yaml", folder / "metadata.yaml");
+  fs::remove(file);
+  const auto not_yet = open_dataset(request(folder));
+  ASSERT_FALSE(not_yet);
+  EXPECT_EQ(not_yet.error().file, packed.string());
+}
+
 TEST_F(SmallBag, FoxgloveIsReadAsTheFolder) {
   std::vector<TestMessage> all = messages(Wire::kProtobuf);
   for (TestMessage& message : all) message.type = "foxglove.RawImage";
