@@ -118,7 +118,7 @@ Result<std::vector<std::string>> add_image_masks(const fs::path& folder, int num
 }
 
 Result<image::Image> read_image_mask(const fs::path& file, const camera::Camera& camera) {
-  auto mask = image_decoding::read_image(file);
+  auto mask = image_decoding::read_mask_file(file);
   if (!mask || (mask->width() == camera.width && mask->height() == camera.height)) return mask;
   return Error{file.string(), "", fmt::format("{}x{} pixels", mask->width(), mask->height()),
                fmt::format("{}x{}, the resolution of {}", camera.width, camera.height, camera.name)};

@@ -7,11 +7,10 @@
 #include <csetjmp>
 #include <cstring>
 #include <memory>
-#include <opencv2/imgproc.hpp>
+#include <opencv2/core.hpp>
 #include <vector>
 
 #include "image_decoding/jpeg_warnings.h"
-#include "image_decoding/plain_files.h"
 
 namespace bslam::image_decoding {
 namespace {
@@ -30,8 +29,10 @@ void leave(png_structp png, png_const_charp) { std::longjmp(*static_cast<std::jm
 
 // A decoder and its buffers, which are also released after an error.
 struct PngReader {
-  explicit PngReader(std::string_view bytes)
-      : rest(bytes), png(png_create_read_struct(PNG_LIBPNG_VER_STRING, &on_error, leave, [](png_structp, auto) {})) {
+  PngReader(std::string_view bytes, OfColours of_colours)
+      : rest(bytes),
+        kept(of_colours),
+        png(png_create_read_struct(PNG_LIBPNG_VER_STRING, &on_error, leave, [](png_structp, auto) {})) {
     if (png) info = png_create_info_struct(png);
   }
   ~PngReader() { png_destroy_read_struct(&png, &info, nullptr); }
@@ -39,6 +40,7 @@ struct PngReader {
   PngReader& operator=(const PngReader&) = delete;
 
   std::string_view rest;
+  OfColours kept;
   std::jmp_buf on_error;
   png_structp png;
   png_infop info = nullptr;
@@ -46,7 +48,7 @@ struct PngReader {
   std::vector<png_bytep> rows;
 };
 
-// Reads the header, asks for grey values, and reserves the image. Returns false if the size is impossible.
+// Reads the header, asks for luminance or colours, and reserves the image. Returns false if the size is impossible.
 bool prepare(PngReader& r) {
   png_set_read_fn(r.png, &r.rest, read_png);
   png_read_info(r.png, r.info);
@@ -57,10 +59,12 @@ bool prepare(PngReader& r) {
   if (colour == PNG_COLOR_TYPE_GRAY && depth < 8) png_set_expand_gray_1_2_4_to_8(r.png);
   if (depth == 16) png_set_swap(r.png);  // little-endian
   png_set_strip_alpha(r.png);
-  if (colour & PNG_COLOR_MASK_COLOR) png_set_rgb_to_gray(r.png, PNG_ERROR_ACTION_NONE, 0.299, 0.587);
+  const bool colours = (colour & PNG_COLOR_MASK_COLOR) != 0, grey = !colours || r.kept == OfColours::kLuminance;
+  if (colours && grey) png_set_rgb_to_gray(r.png, PNG_ERROR_ACTION_NONE, 0.299, 0.587);
   png_set_interlace_handling(r.png);
   png_read_update_info(r.png, r.info);
-  r.image.create(static_cast<int>(height), static_cast<int>(width), depth == 16 ? CV_16UC1 : CV_8UC1);
+  r.image.create(static_cast<int>(height), static_cast<int>(width),
+                 CV_MAKETYPE(depth == 16 ? CV_16U : CV_8U, grey ? 1 : 3));
   for (int y = 0; y < r.image.rows; ++y) r.rows.push_back(r.image.ptr<png_byte>(y));
   return png_get_rowbytes(r.png, r.info) == r.image.step;
 }
@@ -73,32 +77,32 @@ bool decode(PngReader& reader) {
   return true;
 }
 
-cv::Mat decode_png(std::string_view bytes) {
-  PngReader reader(bytes);
-  return reader.info && decode(reader) ? reader.image : cv::Mat();
+cv::Mat decode_png(std::string_view bytes, OfColours kept) {
+  PngReader reader(bytes, kept);
+  return reader.info && decode(reader) ? one_channel(reader.image, kept) : cv::Mat();
 }
 
-cv::Mat decode_jpeg(std::string_view bytes) {
+cv::Mat decode_jpeg(std::string_view bytes, OfColours kept) {
   const std::unique_ptr<void, int (*)(tjhandle)> decoder(tjInitDecompress(), tjDestroy);
   int width = 0, height = 0, subsampling = 0, colours = 0;
   if (!decoder ||
       tjDecompressHeader3(decoder.get(), data(bytes), bytes.size(), &width, &height, &subsampling, &colours) != 0)
     return {};
   if (static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height) > kMaxPixels) return {};
-  cv::Mat image(height, width, CV_8UC1);
+  const bool grey = kept == OfColours::kLuminance || colours == TJCS_GRAY;
+  cv::Mat image(height, width, grey ? CV_8UC1 : CV_8UC3);
   const int failed = tjDecompress2(decoder.get(), data(bytes), bytes.size(), image.data, width,
-                                   static_cast<int>(image.step), height, TJPF_GRAY, 0);
-  return failed == 0 || is_usable(decoder.get()) ? image : cv::Mat();
+                                   static_cast<int>(image.step), height, grey ? TJPF_GRAY : TJPF_BGR, 0);
+  return failed == 0 || is_usable(decoder.get()) ? one_channel(image, kept) : cv::Mat();
 }
 
-cv::Mat decode_webp(std::string_view bytes) {
+cv::Mat decode_webp(std::string_view bytes, OfColours kept) {
   int width = 0, height = 0;
   if (!WebPGetInfo(data(bytes), bytes.size(), &width, &height)) return {};
-  cv::Mat colours(height, width, CV_8UC3), grey;
+  cv::Mat colours(height, width, CV_8UC3);
   if (!WebPDecodeBGRInto(data(bytes), bytes.size(), colours.data, colours.total() * 3, static_cast<int>(colours.step)))
     return {};
-  cv::cvtColor(colours, grey, cv::COLOR_BGR2GRAY);
-  return grey;
+  return one_channel(colours, kept);
 }
 
 bool jpeg_has_colours(std::string_view bytes) {
@@ -119,12 +123,12 @@ bool has_colours(std::string_view bytes) {
   return bytes.starts_with("RIFF") || plain_file_has_colours(bytes);
 }
 
-cv::Mat decode_to_grey(std::string_view bytes) {
+cv::Mat decode_to_grey(std::string_view bytes, OfColours kept) {
   try {
-    if (bytes.starts_with("\x89PNG")) return decode_png(bytes);
-    if (bytes.starts_with("\xff\xd8")) return decode_jpeg(bytes);
-    if (bytes.starts_with("RIFF")) return decode_webp(bytes);
-    return decode_plain_file(bytes);
+    if (bytes.starts_with("\x89PNG")) return decode_png(bytes, kept);
+    if (bytes.starts_with("\xff\xd8")) return decode_jpeg(bytes, kept);
+    if (bytes.starts_with("RIFF")) return decode_webp(bytes, kept);
+    return decode_plain_file(bytes, kept);
   } catch (const cv::Exception&) {  // no memory for the size in the header: the file is damaged
   }
   return {};

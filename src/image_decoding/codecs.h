@@ -5,11 +5,13 @@
 #include <opencv2/core/mat.hpp>
 #include <string_view>
 
+#include "image_decoding/plain_files.h"
+
 namespace bslam::image_decoding {
 
-// Decodes to one channel of 8 or, for files with 16 bits, 16 bits. Colours become luminance, transparency and
-// orientation tags are ignored. The result is empty if the bytes cannot be decoded.
-cv::Mat decode_to_grey(std::string_view bytes);
+// Decodes to one channel of 8 or, for files with 16 bits, 16 bits. Transparency and orientation tags are ignored. The
+// result is empty if the bytes cannot be decoded.
+cv::Mat decode_to_grey(std::string_view bytes, OfColours kept = OfColours::kLuminance);
 
 // Returns true if a file that can be decoded has colours rather than one channel.
 bool has_colours(std::string_view bytes);

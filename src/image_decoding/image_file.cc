@@ -34,8 +34,8 @@ void copy_row(const std::uint16_t* in, int bits, int width, std::uint8_t* out) {
                  [shift](std::uint16_t v) { return static_cast<std::uint8_t>(std::min(v >> shift, 255)); });
 }
 
-std::optional<image::Image> decode_with_library(std::string_view bytes, int bits) {
-  const cv::Mat decoded = decode_to_grey(bytes);
+std::optional<image::Image> decode_with_library(std::string_view bytes, int bits, OfColours kept) {
+  const cv::Mat decoded = decode_to_grey(bytes, kept);
   if (decoded.empty() || (decoded.depth() != CV_8U && decoded.depth() != CV_16U)) return std::nullopt;
   image::Image image(decoded.cols, decoded.rows);
   for (int y = 0; y < decoded.rows; ++y) {
@@ -80,14 +80,14 @@ bool is_16_bit_png(std::string_view bytes) {
   return image_files::is_complete_png(bytes) && bytes[kBitDepth] == 16;
 }
 
-std::optional<image::Image> decode_values(std::string_view bytes, int bits) {
+std::optional<image::Image> decode_values(std::string_view bytes, int bits, OfColours kept = OfColours::kLuminance) {
   if (bytes.size() > kMaxImageBytes) return std::nullopt;
   if (image_files::is_complete_png(bytes)) {
     auto image = image_files::decode_grey_png(bytes);
-    return image ? std::move(image) : decode_with_library(bytes, bits);
+    return image ? std::move(image) : decode_with_library(bytes, bits, kept);
   }
   const bool whole = is_whole_jpeg(bytes) || is_whole_webp(bytes) || is_plain_file(bytes);
-  return whole ? decode_with_library(bytes, bits) : std::nullopt;
+  return whole ? decode_with_library(bytes, bits, kept) : std::nullopt;
 }
 
 // The bytes of an image in memory. Errors as of the file or the recording.
@@ -97,6 +97,11 @@ Result<image_files::StoredImage> read_stored(const image_files::ImageFile& image
   if (!bytes) return bytes.error();
   const std::size_t size = bytes->size();
   return image_files::StoredImage{.bytes = *std::move(bytes), .size = size};
+}
+
+Error not_readable(const std::filesystem::path& file) {
+  return {file.string(), "", "an incomplete image or another format",
+          "a complete PNG, JPEG, WebP, PGM, BMP or TIFF image"};
 }
 
 }  // namespace
@@ -111,9 +116,7 @@ Result<image::Image> read_image(const std::filesystem::path& file, const PixelFo
   const auto bytes = read_file(file, kMaxImageBytes);
   if (!bytes) return bytes.error();
   auto image = decode_grey(*bytes, format);
-  if (!image)
-    return Error{file.string(), "", "an incomplete image or another format",
-                 "a complete PNG, JPEG, WebP, PGM, BMP or TIFF image"};
+  if (!image) return not_readable(file);
   return *std::move(image);
 }
 
@@ -171,9 +174,18 @@ int bits_in_use(std::span<const image_files::ImageFile> images) {
   return 16;
 }
 
+Result<image::Image> read_mask_file(const std::filesystem::path& file) {
+  constexpr int kBits = 8;  // larger values are clamped, so that labels below 256 are kept
+  const auto bytes = read_file(file, kMaxImageBytes);
+  if (!bytes) return bytes.error();
+  auto mask = decode_values(*bytes, kBits, OfColours::kLargest);
+  if (!mask) return not_readable(file);
+  return *std::move(mask);
+}
+
 Result<image::Image> read_mask(const camera::Camera& camera) {
   if (camera.mask_file.empty()) return image::Image();
-  auto mask = read_image(camera.mask_file);
+  auto mask = read_mask_file(camera.mask_file);
   if (!mask) return mask;
   return image_files::checked_mask(*std::move(mask), camera);
 }

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <opencv2/imgproc.hpp>
 #include <optional>
+#include <vector>
 
 namespace bslam::image_decoding {
 namespace {
@@ -56,7 +57,7 @@ bool read_values(std::string_view rest, cv::Mat& image) {
   return true;
 }
 
-cv::Mat decode_pnm(std::string_view bytes) {
+cv::Mat decode_pnm(std::string_view bytes, OfColours kept) {
   const char kind = bytes[1];
   std::string_view rest = bytes.substr(2);
   const auto width = take_number(rest), height = take_number(rest), most = take_number(rest);
@@ -68,7 +69,7 @@ cv::Mat decode_pnm(std::string_view bytes) {
   if (!(kind == '2' ? read_text_values(rest, image) : read_values(rest, image))) return {};
   if (*most < 255) image.convertTo(image, -1, 255.0 / *most);
   if (kind == '6') cv::cvtColor(image, image, cv::COLOR_RGB2BGR);
-  return brightness(image);
+  return one_channel(image, kept);
 }
 
 std::uint32_t number_at(std::string_view bytes, std::size_t at, std::size_t count) {
@@ -102,19 +103,19 @@ std::optional<BmpHeader> bmp_header(std::string_view bytes) {
   return static_cast<std::uint64_t>(h.width * rows) > kMaxPixels ? std::nullopt : std::optional(h);
 }
 
-// The colours of images with 8 bits per pixel as brightness.
-std::optional<std::array<std::uint8_t, 256>> grey_table(std::string_view bytes, const BmpHeader& h) {
+// The colours of images with 8 bits per pixel as one channel.
+std::optional<std::array<std::uint8_t, 256>> grey_table(std::string_view bytes, const BmpHeader& h, OfColours kept) {
   const std::size_t at = std::size_t{14} + h.size, count = h.colours == 0 ? 256 : std::min(h.colours, 256U);
   std::array<std::uint8_t, 256> table{};
   if (at > bytes.size() || bytes.size() - at < 4 * count) return std::nullopt;
   cv::Mat colours(1, static_cast<int>(count), CV_8UC4);
   std::memcpy(colours.data, bytes.data() + at, 4 * count);
-  const cv::Mat grey = brightness(colours);
+  const cv::Mat grey = one_channel(colours, kept);
   std::copy_n(grey.ptr<std::uint8_t>(0), count, table.begin());
   return table;
 }
 
-cv::Mat decode_bmp(std::string_view bytes) {
+cv::Mat decode_bmp(std::string_view bytes, OfColours kept) {
   const auto h = bmp_header(bytes);
   if (!h) return {};
   const int channels = h->bits / 8, rows = static_cast<int>(std::abs(h->height));
@@ -126,8 +127,8 @@ cv::Mat decode_bmp(std::string_view bytes) {
     const auto from = static_cast<std::size_t>(h->height > 0 ? rows - 1 - y : y);
     std::memcpy(image.ptr(y), bytes.data() + h->begin + step * from, row);
   }
-  if (channels > 1) return brightness(image);
-  const auto table = grey_table(bytes, *h);
+  if (channels > 1) return one_channel(image, kept);
+  const auto table = grey_table(bytes, *h, kept);
   if (!table) return {};
   for (int y = 0; y < rows; ++y) {
     auto* const pixels = image.ptr<std::uint8_t>(y);
@@ -147,11 +148,16 @@ bool is_pnm(std::string_view bytes) {
 
 }  // namespace
 
-cv::Mat brightness(const cv::Mat& image) {
+cv::Mat one_channel(const cv::Mat& image, OfColours kept) {
   if (image.channels() == 1) return image;
-  cv::Mat grey;
-  cv::cvtColor(image, grey, image.channels() == 3 ? cv::COLOR_BGR2GRAY : cv::COLOR_BGRA2GRAY);
-  return grey;
+  cv::Mat out;
+  if (kept == OfColours::kLuminance) {
+    cv::cvtColor(image, out, image.channels() == 3 ? cv::COLOR_BGR2GRAY : cv::COLOR_BGRA2GRAY);
+    return out;
+  }
+  std::vector<cv::Mat> channels;
+  cv::split(image, channels);
+  return cv::max(cv::max(channels[0], channels[1]), channels[2]);
 }
 
 bool is_plain_file(std::string_view bytes) { return is_pnm(bytes) || bytes.starts_with("BM") || is_tiff(bytes); }
@@ -171,10 +177,10 @@ bool plain_file_has_colours(std::string_view bytes) {
   return bmp && bmp->bits > 8;
 }
 
-cv::Mat decode_plain_file(std::string_view bytes) {
-  if (is_pnm(bytes)) return decode_pnm(bytes);
-  if (bytes.starts_with("BM")) return decode_bmp(bytes);
-  return is_tiff(bytes) ? decode_tiff(bytes) : cv::Mat();
+cv::Mat decode_plain_file(std::string_view bytes, OfColours kept) {
+  if (is_pnm(bytes)) return decode_pnm(bytes, kept);
+  if (bytes.starts_with("BM")) return decode_bmp(bytes, kept);
+  return is_tiff(bytes) ? decode_tiff(bytes, kept) : cv::Mat();
 }
 
 }  // namespace bslam::image_decoding

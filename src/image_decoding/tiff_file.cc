@@ -225,7 +225,7 @@ bool tiff_has_colours(std::string_view bytes) {
   return image && image->samples >= 3;
 }
 
-cv::Mat decode_tiff(std::string_view bytes) {
+cv::Mat decode_tiff(std::string_view bytes, OfColours kept) {
   const TiffBytes in{bytes, bytes.front() == 'M'};
   const auto image = read_fields(in);
   if (!image) return {};
@@ -237,7 +237,7 @@ cv::Mat decode_tiff(std::string_view bytes) {
   if (image->samples == 2) cv::extractChannel(out, out, 0);
   if (image->samples >= 3) cv::cvtColor(out, out, image->samples == 3 ? cv::COLOR_RGB2BGR : cv::COLOR_RGBA2BGRA);
   if (image->photometric == 0) cv::bitwise_not(out, out);
-  return brightness(out);
+  return one_channel(out, kept);
 }
 
 }  // namespace bslam::image_decoding

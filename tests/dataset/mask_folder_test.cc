@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+
 #include "dataset/dataset.h"
 #include "dataset/frame_reader.h"
 #include "support/data_on_disk.h"
@@ -55,6 +58,15 @@ TEST_F(MaskFolder, ImagesHaveMasksOfTheirOwn) {
     EXPECT_EQ(bundle.images[0].mask_view().empty(), f != 3) << "frame " << f;
     EXPECT_TRUE(bundle.images[1].mask_view().empty());
   }
+}
+
+TEST_F(MaskFolder, MasksOfImagesMayBeSmallNumbersOf16Bits) {
+  std::filesystem::create_directories(masks() / "cam1");
+  const cv::Mat ones(support::kSmallHeight, support::kSmallWidth, CV_16UC1, cv::Scalar(1));
+  ASSERT_TRUE(cv::imwrite((masks() / "cam1" / support::small_image_name(3)).string(), ones));
+  const auto dataset = open({1, 0});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_NE(read_frame(*dataset, 3).images[0].mask.row(4)[4], 0);
 }
 
 TEST_F(MaskFolder, MasksThatBelongToNoImageAreReported) {

@@ -205,6 +205,32 @@ TEST(ImageFile, ReadsFiles) {
   EXPECT_FALSE(read_image(folder.path()));
 }
 
+// Labels are small numbers or dark colours; only zero and black mask a pixel.
+TEST(ImageFile, EveryValueOfAMaskExceptZeroIsUsed) {
+  const support::TemporaryFolder folder;
+  const auto expect_half = [&](const cv::Mat& used, const std::string& name) {
+    cv::Mat mask = cv::Mat::zeros(10, 20, used.type());
+    used.copyTo(mask.rowRange(5, 10));
+    const std::string file = (folder.path() / name).string();
+    ASSERT_TRUE(cv::imwrite(file, mask, {cv::IMWRITE_WEBP_QUALITY, 101}));
+    const auto read = read_mask_file(file);
+    ASSERT_TRUE(read) << read.error().message();
+    for (int y = 0; y < 10; ++y) EXPECT_EQ(read->row(y)[3] != 0, y >= 5) << name << ", row " << y;
+  };
+  for (const int value : {1, 200, 255, 256, 512, 65535})
+    expect_half(cv::Mat(5, 20, CV_16UC1, cv::Scalar(value)), "words.png");
+  for (const cv::Scalar& colour : {cv::Scalar(1, 0, 0), cv::Scalar(0, 1, 0), cv::Scalar(0, 0, 1)}) {
+    for (const char* name : {"colours.png", "colours.webp", "colours.bmp", "colours.tiff", "colours.ppm"})
+      expect_half(cv::Mat(5, 20, CV_8UC3, colour), name);
+    expect_half(cv::Mat(5, 20, CV_16UC3, colour), "colour_words.png");
+  }
+  expect_half(cv::Mat(5, 20, CV_8UC1, cv::Scalar(1)), "grey.png");
+  expect_half(cv::Mat(5, 20, CV_8UC1, cv::Scalar(1)), "grey.pgm");
+  ASSERT_TRUE(cv::imwrite((folder.path() / "dark.jpg").string(), cv::Mat(16, 16, CV_8UC3, cv::Scalar(5, 0, 0)),
+                          {cv::IMWRITE_JPEG_QUALITY, 100}));
+  EXPECT_GT(read_mask_file(folder.path() / "dark.jpg").value().row(8)[8], 0);
+}
+
 TEST(ImageFile, ReadsMasksOfTheCamerasSize) {
   const support::TemporaryFolder folder;
   support::write_image(folder.path() / "mask.png", 20, 10);
