@@ -58,6 +58,7 @@ bool prepare(PngReader& r) {
   if (colour == PNG_COLOR_TYPE_PALETTE) png_set_palette_to_rgb(r.png);
   if (colour == PNG_COLOR_TYPE_GRAY && depth < 8) png_set_expand_gray_1_2_4_to_8(r.png);
   if (depth == 16) png_set_swap(r.png);  // little-endian
+  png_set_gamma(r.png, 1.0, 1.0);        // colours are weighed as they are stored, whatever gamma the file declares
   png_set_strip_alpha(r.png);
   const bool colours = (colour & PNG_COLOR_MASK_COLOR) != 0, grey = !colours || r.kept == OfColours::kLuminance;
   if (colours && grey) png_set_rgb_to_gray(r.png, PNG_ERROR_ACTION_NONE, 0.299, 0.587);

@@ -1,6 +1,7 @@
 #include "image_decoding/image_file.h"
 
 #include <gtest/gtest.h>
+#include <libdeflate.h>
 
 #include <algorithm>
 #include <array>
@@ -138,6 +139,36 @@ TEST(ImageFile, ConvertsColoursToGrey) {
   const auto image = decode_grey(encoded(original, ".png"));
   ASSERT_TRUE(image);
   EXPECT_NEAR(image->row(3)[4], 0.114 * 200 + 0.587 * 100 + 0.299 * 50, 1.01);
+}
+
+// A chunk of a PNG with its length and checksum.
+std::string chunk(const std::string& name, const std::string& data) {
+  const auto big_endian = [](std::uint32_t value) {
+    std::string out;
+    for (int shift = 24; shift >= 0; shift -= 8) out += static_cast<char>(value >> shift);
+    return out;
+  };
+  return big_endian(static_cast<std::uint32_t>(data.size())) + name + data +
+         big_endian(libdeflate_crc32(0, (name + data).data(), name.size() + data.size()));
+}
+
+// JPEG files have no such chunk, and grey values must not depend on the program that wrote an image.
+TEST(ImageFile, IgnoresTheGammaThatAPngDeclares) {
+  const std::string gamma = chunk("gAMA", std::string("\0\0\xb1\x8f", 4)), srgb = chunk("sRGB", std::string(1, '\0')),
+                    primaries = chunk("cHRM", std::string("\0\0\x7a\x26\0\0\x80\x84\0\0\xfa\0\0\0\x80\xe8"
+                                                          "\0\0\x75\x30\0\0\xea\x60\0\0\x3a\x98\0\0\x17\x70",
+                                                          32));
+  for (const int depth : {CV_8U, CV_16U}) {
+    const double one = depth == CV_8U ? 1 : 257;
+    const cv::Mat red(6, 8, CV_MAKETYPE(depth, 3), cv::Scalar(0, 0, 255 * one));
+    const std::string plain = encoded(red, ".png");
+    constexpr std::size_t kAfterHeader = 33;  // signature and the chunk IHDR
+    for (const std::string& added : {std::string(), gamma, srgb, gamma + primaries, srgb + gamma + primaries}) {
+      const auto image = decode_grey(plain.substr(0, kAfterHeader) + added + plain.substr(kAfterHeader));
+      ASSERT_TRUE(image);
+      EXPECT_EQ(image->row(2)[3], 76) << added.size() << " bytes, depth " << depth;
+    }
+  }
 }
 
 TEST(ImageFile, DecodesJpeg) {
