@@ -10,6 +10,8 @@
 
 #include "containers/ros_writer.h"
 #include "dataset/live_recording.h"
+#include "image_decoding/image_file.h"
+#include "image_files/png_encoder.h"
 #include "rig_formats/bslam_rig.h"
 
 namespace bslam::capture {
@@ -40,6 +42,29 @@ std::vector<std::string> topics_of(const camera::Rig& rig, const std::vector<boo
   return out;
 }
 
+// The rig with its masks as they are named inside the recording.
+camera::Rig with_masks_inside(const camera::Rig& rig) {
+  std::vector<camera::RigCamera> cameras;
+  for (std::size_t c = 0; c < rig.size(); ++c) {
+    cameras.push_back({rig.camera(c), rig.body_from_cam(c)});
+    std::string& mask = cameras.back().camera.mask_file;
+    if (!mask.empty()) mask = dataset::live_mask_file(c);
+  }
+  return camera::Rig(std::move(cameras), rig.cam_from_rig(0));
+}
+
+// The rig comes first, since readers may keep only some of the attachments.
+Status attach_rig(const camera::Rig& rig, const std::vector<image::Image>& masks, containers::McapWriter& writer) {
+  const std::string text = rig_formats::rig_to_yaml(with_masks_inside(rig));
+  if (const Status s = writer.attach(dataset::kLiveRigFile, "application/yaml", text); !s) return s;
+  for (std::size_t c = 0; c < masks.size(); ++c) {
+    if (masks[c].empty()) continue;
+    const std::string png = image_files::encode_grey_png(masks[c]);
+    if (const Status s = writer.attach(dataset::live_mask_file(c), "image/png", png); !s) return s;
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<camera::Rig> rig_as_recorded(const camera::Rig& rig) {
@@ -50,12 +75,13 @@ Result<camera::Rig> rig_as_recorded(const camera::Rig& rig) {
 
 Result<std::unique_ptr<Recorder>> Recorder::create(const std::filesystem::path& path, const camera::Rig& rig,
                                                    const std::vector<int>& numbers, const std::vector<bool>& jpeg) {
+  const auto masks = image_decoding::read_masks(rig);  // before the file is replaced, which may contain them
+  if (!masks) return masks.error();
   auto file = containers::McapWriter::create(path);
   if (!file) return file.error();
   containers::McapWriter& writer = **file;
   const std::vector<std::string> topics = topics_of(rig, jpeg);
-  if (const Status s = writer.attach(dataset::kLiveRigFile, "application/yaml", rig_formats::rig_to_yaml(rig)); !s)
-    return s.error();
+  if (const Status s = attach_rig(rig, *masks, writer); !s) return s.error();
   if (const Status s = writer.add_metadata(dataset::kLiveMetadata, dataset::live_metadata(topics, numbers)); !s)
     return s.error();
   for (std::size_t c = 0; c < rig.size(); ++c) {

@@ -19,14 +19,15 @@
 
 namespace bslam::capture {
 
-// Returns the rig as it is read back from a recording. Rotations of other formats than that of bslam may differ in
-// their last bits. A run that is to be repeated exactly must use it.
+// Returns the rig as it is read back from a recording, with the paths of its own masks. Rotations of other formats than
+// that of bslam may differ in their last bits. A run that is to be repeated exactly must use it.
 Result<camera::Rig> rig_as_recorded(const camera::Rig& rig);
 
 class Recorder {
  public:
   // `numbers`: indices in the rig file of the cameras of `rig`. `jpeg[i]`: camera i delivers JPEG files, which are
-  // recorded as they are; other images are recorded as grey values. Error: the file cannot be written.
+  // recorded as they are; other images are recorded as grey values. Errors: the file cannot be written; a mask cannot
+  // be read.
   static Result<std::unique_ptr<Recorder>> create(const std::filesystem::path& path, const camera::Rig& rig,
                                                   const std::vector<int>& numbers, const std::vector<bool>& jpeg);
   ~Recorder();  // calls finish()

@@ -29,6 +29,26 @@ struct Record {
   std::uint64_t end() const { return data_at + data_size; }
 };
 
+std::optional<Record> parse_head(std::string_view head, std::uint64_t at) {
+  if (head.size() < kHead) return std::nullopt;
+  ByteReader in(head);
+  Record record{in.number<unsigned char>(), at + kHead, 0};
+  record.data_size = in.number<std::uint64_t>();
+  if (record.op == 0 || record.data_size > std::uint64_t{1} << 62) return std::nullopt;
+  return record;
+}
+
+std::optional<Attachment> parse_attachment(std::string_view data) {
+  ByteReader in(data);
+  in.skip(16);  // the times of recording and creation
+  const std::string_view name = in.counted();
+  in.counted();  // its type
+  const auto size = in.number<std::uint64_t>();
+  if (!in.ok() || size > in.left()) return std::nullopt;
+  const std::string_view bytes = in.take(static_cast<std::size_t>(size));
+  return Attachment{std::string(name), std::string(bytes)};
+}
+
 Serialisation serialisation_named(std::string_view name) {
   if (name == "ros1") return Serialisation::kRos1;
   if (name == "cdr") return Serialisation::kCdr;
@@ -70,13 +90,7 @@ class McapFile : public ChunkedFile {
   static constexpr std::uint64_t kMessageHead = 22;  // channel, sequence, time of logging, time of publication
 
   std::optional<Record> record_at(std::uint32_t chunk, std::uint64_t at) const {
-    const std::string head = bytes(chunk, at, kHead);
-    if (head.size() < kHead) return std::nullopt;
-    ByteReader in(head);
-    Record record{in.number<unsigned char>(), at + kHead, 0};
-    record.data_size = in.number<std::uint64_t>();
-    if (record.op == 0 || record.data_size > std::uint64_t{1} << 62) return std::nullopt;
-    return record;
+    return parse_head(bytes(chunk, at, kHead), at);
   }
   // Returns the data of a record; empty if it is truncated or larger than kMaxDataBytes.
   std::string data_of(std::uint32_t chunk, const Record& record) const {
@@ -125,14 +139,8 @@ void McapFile::add_channel(std::string_view data) {
 }
 
 void McapFile::add_attachment(std::string_view data) {
-  ByteReader in(data);
-  in.skip(16);  // the times of recording and creation
-  const std::string_view name = in.counted();
-  in.counted();  // its type
-  const auto size = in.number<std::uint64_t>();
-  if (!in.ok() || size > in.left()) return;
-  const std::string_view bytes = in.take(static_cast<std::size_t>(size));
-  if (attachments_.size() < kMaxAttachments) attachments_.push_back({std::string(name), std::string(bytes)});
+  auto attachment = parse_attachment(data);
+  if (attachment && attachments_.size() < kMaxAttachments) attachments_.push_back(*std::move(attachment));
 }
 
 void McapFile::add_metadata(std::string_view data) {
@@ -282,6 +290,21 @@ Status McapFile::index() {
 }
 
 }  // namespace
+
+Result<std::string> read_attachment(const std::filesystem::path& file, std::string_view name) {
+  const auto mcap = InputFile::open(file);
+  if (!mcap) return mcap.error();
+  if (mcap->read(0, kMagic.size()) != kMagic) return Error{file.string(), "", "another format", "an MCAP file"};
+  for (std::uint64_t at = kMagic.size(); at < mcap->size();) {
+    const auto record = parse_head(mcap->read(at, kHead), at);
+    if (!record || record->op == kDataEnd || record->op == kFooter) break;
+    at = record->end();
+    if (record->op != kAttachmentRecord || record->data_size > kMaxDataBytes || at > mcap->size()) continue;
+    auto attachment = parse_attachment(mcap->read(record->data_at, record->data_size));
+    if (attachment && attachment->name == name) return std::move(attachment->bytes);
+  }
+  return Error{file.string(), "", fmt::format("no attachment {}", name), "a recording that contains it"};
+}
 
 MessageFileResult open_mcap(const std::filesystem::path& path) {
   auto file = InputFile::open(path);

@@ -88,6 +88,10 @@ using MessageFileResult = Result<std::unique_ptr<MessageFile>>;
 // Recognises the format by the first bytes. Errors: the file cannot be read; another format; no topic can be read.
 MessageFileResult open_message_file(const std::filesystem::path& path);
 
+// Returns an attachment of an MCAP file, of any size up to 64 MB. Reads only the file's records up to there. Errors:
+// the file cannot be read or is no MCAP file; it has no such attachment, or a damaged one.
+Result<std::string> read_attachment(const std::filesystem::path& file, std::string_view name);
+
 // Returns true if the name of the file ends as those of message files do: .bag, .db3 or .mcap.
 bool has_message_file_name(const std::filesystem::path& path);
 

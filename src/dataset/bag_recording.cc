@@ -63,6 +63,9 @@ class BagRecording : public Recording {
     return live_ && !live_->cameras.empty() ? "rig of bslam live in its recording" : "CameraInfo of a bag";
   }
   Result<camera::RigCamera> calibration(std::size_t camera) const override;
+  Status check_calibration(const camera::Rig& rig) const override {
+    return live_ ? check_masks(store_->files().front()->path(), rig) : Status();
+  }
   int number_in_rig(std::size_t camera) const override {
     const auto number = live_ ? live_->number_of(topics_[cameras_[camera]].name) : std::nullopt;
     return number.value_or(static_cast<int>(camera));

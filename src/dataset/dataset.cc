@@ -272,6 +272,7 @@ Result<Dataset> dataset_of(const DatasetRequest& original, const OpenRecording& 
   auto chosen = given ? choose_given(request, recording) : choose_own(request, recording);
   if (!chosen) return chosen.error();
   if (const Status s = use_masks(request, recording, *chosen); !s) return s.error();
+  if (const Status s = given ? Status() : recording.check_calibration(chosen->rig); !s) return s.error();
   if (own_rig_file && !request.rig_file) {
     warn_of_times(*own_rig_file, chosen->warnings);
     take_names(*own_rig_file, recording.camera_count(), *chosen);

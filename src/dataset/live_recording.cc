@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <system_error>
 #include <utility>
 
 #include "base/split.h"
@@ -47,6 +48,22 @@ std::map<std::string, std::string> live_metadata(const std::vector<std::string>&
   return {{kTopics, fmt::format("{}", fmt::join(topics, ","))},
           {kCameras, fmt::format("{}", fmt::join(numbers, ","))},
           {"frames", "images with the same log_time are one frame"}};
+}
+
+std::string live_mask_file(std::size_t camera) { return fmt::format("masks/cam{}.png", camera); }
+
+Status check_masks(const std::filesystem::path& path, const camera::Rig& rig) {
+  const std::string inside = (std::filesystem::absolute(path) / "").lexically_normal().string();
+  std::error_code error;
+  for (std::size_t c = 0; c < rig.size(); ++c) {
+    const camera::Camera& camera = rig.camera(c);
+    if (camera.mask_file.empty() || camera.mask_file.starts_with(inside)) continue;
+    if (std::filesystem::exists(camera.mask_file, error)) continue;
+    return Error{path.string(), camera.name,
+                 fmt::format("no file {}, the mask of the rig inside the recording", camera.mask_file),
+                 "this file, or another calibration with --rig FILE, or masks with --masks DIR"};
+  }
+  return {};
 }
 
 std::optional<LiveRecording> live_recording_of(const containers::MessageFile& file) {

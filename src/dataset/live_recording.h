@@ -1,7 +1,9 @@
 // What `bslam live --record` writes into its MCAP files beside the images: which topic is which camera, the cameras in
-// use with their numbers in the rig file, and that images recorded at the same time were one frame.
+// use with their numbers in the rig file and their masks, and that images recorded at the same time were one frame.
 #pragma once
 
+#include <cstddef>
+#include <filesystem>
 #include <map>
 #include <optional>
 #include <string>
@@ -14,6 +16,10 @@ namespace bslam::dataset {
 
 constexpr const char* kLiveMetadata = "bslam.live";  // name of the metadata
 constexpr const char* kLiveRigFile = "rig.yaml";     // name of the attachment, in the format of bslam
+
+// Name of the attachment with the mask of a camera, a PNG. The rig has it as the mask of the camera: its path is that
+// of the recording and this name.
+std::string live_mask_file(std::size_t camera);
 
 struct LiveRecording {
   std::vector<std::string> topics;  // topics of the cameras of the rig, in its order
@@ -31,6 +37,10 @@ struct LiveRecording {
 // The values of the metadata for these topics, which are those of cameras `numbers` of the rig file.
 std::map<std::string, std::string> live_metadata(const std::vector<std::string>& topics,
                                                  const std::vector<int>& numbers);
+
+// Recordings of earlier versions have no masks: their rigs name the files on the computer that recorded. Returns the
+// error if the file of such a mask of `rig`, which is that of the recording at `path`, does not exist.
+Status check_masks(const std::filesystem::path& path, const camera::Rig& rig);
 
 // Returns nullopt for other recordings.
 std::optional<LiveRecording> live_recording_of(const containers::MessageFile& file);

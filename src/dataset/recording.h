@@ -26,6 +26,8 @@ class Recording {
   virtual std::string calibration_origin() const { return {}; }
   // Returns the calibration in the data set.
   virtual Result<camera::RigCamera> calibration(std::size_t camera) const = 0;
+  // Returns the error if a file that the calibration of the data set names does not exist. `rig`: the cameras in use.
+  virtual Status check_calibration(const camera::Rig& /*rig*/) const { return {}; }
   // Returns the number of a camera in the rig file with which it was recorded, if that has more cameras.
   virtual int number_in_rig(std::size_t camera) const { return static_cast<int>(camera); }
   // Returns all listed images with their recorded time stamps; at least one.

@@ -5,9 +5,11 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 #include <string>
+#include <system_error>
 #include <utility>
 
 #include "base/atomic_file.h"
+#include "containers/message_file.h"
 #include "image_decoding/codecs.h"
 #include "image_decoding/pixel_rows.h"
 #include "image_decoding/plain_files.h"
@@ -99,6 +101,16 @@ Result<image_files::StoredImage> read_stored(const image_files::ImageFile& image
   return image_files::StoredImage{.bytes = *std::move(bytes), .size = size};
 }
 
+// The bytes of a mask, which may be inside of a recording of bslam live.
+Result<std::string> mask_bytes(const std::filesystem::path& file) {
+  std::error_code error;
+  for (auto outer = file.parent_path(); outer.has_relative_path(); outer = outer.parent_path()) {
+    if (std::filesystem::is_regular_file(outer, error))
+      return containers::read_attachment(outer, file.lexically_relative(outer).generic_string());
+  }
+  return read_file(file, kMaxImageBytes);
+}
+
 Error not_readable(const std::filesystem::path& file) {
   return {file.string(), "", "an incomplete image or another format",
           "a complete PNG, JPEG, WebP, PGM, BMP or TIFF image"};
@@ -176,7 +188,7 @@ int bits_in_use(std::span<const image_files::ImageFile> images) {
 
 Result<image::Image> read_mask_file(const std::filesystem::path& file) {
   constexpr int kBits = 8;  // larger values are clamped, so that labels below 256 are kept
-  const auto bytes = read_file(file, kMaxImageBytes);
+  const auto bytes = mask_bytes(file);
   if (!bytes) return bytes.error();
   auto mask = decode_values(*bytes, kBits, OfColours::kLargest);
   if (!mask) return not_readable(file);

@@ -37,8 +37,8 @@ std::optional<image::Image> decode_stored(const image_files::StoredImage& image,
 // has no common number of bits.
 int bits_in_use(std::span<const image_files::ImageFile> images);
 
-// Reads a mask, which is 0 where the file has the value 0 or the colour black, whatever its number of bits. Errors as
-// read_image.
+// Reads a mask, which is 0 where the file has the value 0 or the colour black, whatever its number of bits.
+// FILE.mcap/NAME is an attachment of an MCAP file. Errors as read_image; no such attachment.
 Result<image::Image> read_mask_file(const std::filesystem::path& file);
 
 // Reads the mask of a camera, in which 0 marks pixels to ignore; an empty image if the camera has none. Errors: the

@@ -15,6 +15,7 @@
 #include "capture/pixels.h"
 #include "capture/played_folders.h"
 #include "dataset/frame_reader.h"
+#include "image_decoding/image_file.h"
 #include "support/data_on_disk.h"
 #include "synthetic/rigs.h"
 
@@ -234,6 +235,40 @@ TEST_F(LiveCamerasTest, RecordingHasTheSameFrames) {
     }
   }
   EXPECT_GE(missing, 8u);
+}
+
+// A recording can be run where the files of the masks are others, or do not exist.
+TEST_F(LiveCamerasTest, RecordingHasTheMasksOfTheRig) {
+  const support::TemporaryFolder folder;
+  const auto file = folder.path() / "live.mcap";
+  camera::Camera masked = rig_.camera(std::size_t{1});
+  masked.mask_file = (folder.path() / "mask.png").string();
+  cv::Mat mask(masked.height, masked.width, CV_16UC1, cv::Scalar(3));
+  mask.rowRange(0, 5) = 0;
+  ASSERT_TRUE(cv::imwrite(masked.mask_file, mask));
+  const camera::Rig rig({{rig_.camera(std::size_t{0}), rig_.body_from_cam(0)}, {masked, rig_.body_from_cam(1)}});
+  auto live = open(eventful());
+  ASSERT_TRUE(live->wait_for_first_frame().ok());
+  auto recorder = Recorder::create(file, rig, {0, 1}, {false, true});
+  ASSERT_TRUE(recorder.ok()) << recorder.error().message();
+  live->record_to(recorder->get());
+  live->begin();
+  script_->open_gate();
+  all(*live);
+  ASSERT_TRUE((*recorder)->finish().ok());
+  support::write_image(masked.mask_file, masked.width, masked.height);  // another one
+  const auto elsewhere = folder.path() / "elsewhere.mcap";
+  std::filesystem::rename(file, elsewhere);
+  const auto data = dataset::open_dataset({.path = elsewhere});
+  ASSERT_TRUE(data.ok()) << data.error().message();
+  EXPECT_TRUE(data->warnings.empty()) << data->warnings.front();
+  EXPECT_EQ(data->rig.camera(std::size_t{1}).mask_file, (elsewhere / "masks/cam1.png").string());
+  const auto masks = image_decoding::read_masks(data->rig);
+  ASSERT_TRUE(masks.ok()) << masks.error().message();
+  EXPECT_TRUE((*masks)[0].empty());
+  for (int y = 0; y < masked.height; ++y) EXPECT_EQ((*masks)[1].row(y)[7] != 0, y >= 5) << y;
+  std::filesystem::remove(masked.mask_file);
+  EXPECT_FALSE(Recorder::create(file, rig, {0, 1}, {false, true}).ok());
 }
 
 TEST_F(LiveCamerasTest, RecordedRigIsThatOfTheRun) {

@@ -59,6 +59,28 @@ int images_in_order(const MessageFile& file) {
   return count;
 }
 
+TEST(McapWriter, AttachmentsOfAnyNumberAndSizeAreReadByName) {
+  const support::TemporaryFolder folder;
+  const auto path = folder.path() / "a.mcap";
+  auto writer = McapWriter::create(path);
+  ASSERT_TRUE(writer.ok()) << writer.error().message();
+  const auto bytes = [](int k) { return std::string(k == 19 ? 3'000'000 : 100, static_cast<char>('a' + k)); };
+  for (int k = 0; k < 20; ++k)
+    ASSERT_TRUE((*writer)->attach("masks/cam" + std::to_string(k) + ".png", "image/png", bytes(k)).ok());
+  ASSERT_TRUE((*writer)->flush().ok());
+  for (const bool finished : {false, true}) {
+    ASSERT_TRUE(!finished || (*writer)->finish().ok());
+    for (const int k : {0, 17, 19}) {
+      const auto read = read_attachment(path, "masks/cam" + std::to_string(k) + ".png");
+      ASSERT_TRUE(read.ok()) << read.error().message();
+      EXPECT_TRUE(*read == bytes(k)) << k;
+    }
+    EXPECT_EQ(read_attachment(path, "masks/cam20.png").error().found, "no attachment masks/cam20.png");
+  }
+  support::write_text(path, "not a recording");
+  EXPECT_EQ(read_attachment(path, "masks/cam0.png").error().expected, "an MCAP file");
+}
+
 TEST(McapWriter, IsReadBack) {
   const support::TemporaryFolder folder;
   write_recording(folder.path() / "a.mcap", true);

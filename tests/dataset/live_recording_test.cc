@@ -94,6 +94,24 @@ TEST_F(LiveRecordingTest, HasAnOrderOfItsTopicsForOtherRigs) {
   EXPECT_EQ(data->sources, std::vector{kTopics[0]});
 }
 
+// As recordings of earlier versions have it.
+TEST_F(LiveRecordingTest, NamesAMaskThatItsRigHasAndNoFile) {
+  camera::Camera masked = rig_.camera(std::size_t{0});
+  masked.mask_file = (folder_.path() / "there" / "mask.png").string();
+  const camera::Rig rig({{masked, rig_.body_from_cam(0)}, {rig_.camera(std::size_t{1}), rig_.body_from_cam(1)}});
+  write(rig_formats::rig_to_yaml(rig));
+  const auto data = open_dataset({.path = path()});
+  ASSERT_FALSE(data.ok());
+  EXPECT_EQ(data.error().message(), path().string() + ": " + masked.name + ": found no file " + masked.mask_file +
+                                        ", the mask of the rig inside the recording, expected this file, or another "
+                                        "calibration with --rig FILE, or masks with --masks DIR");
+  EXPECT_TRUE(open_dataset({.path = path(), .cameras = {1}}).ok());
+  support::write_image(folder_.path() / "masks" / "cam0.png", masked.width, masked.height);
+  EXPECT_TRUE(open_dataset({.path = path(), .masks = folder_.path() / "masks"}).ok());
+  support::write_image(masked.mask_file, masked.width, masked.height);
+  EXPECT_TRUE(open_dataset({.path = path()}).ok());
+}
+
 TEST_F(LiveRecordingTest, SaysWhyItsRigIsNotUsed) {
   write("bslam_rig: 1\ncameras: 7\n");
   const auto data = open_dataset({.path = path()});
