@@ -44,7 +44,8 @@ bool is_image_type(std::string_view type);
 bool is_calibration_type(std::string_view type);
 
 // Returns nullopt if the topic has another type or serialisation, or if the message is damaged or ends before the
-// pixels (ROS) or the time stamp (protobuf). The message need not contain the pixels.
+// pixels (ROS) or the time stamp (protobuf). The message need not contain the pixels, unless it has no time stamp
+// (protobuf).
 std::optional<ImageMessage> parse_image(const Topic& topic, std::string_view message);
 
 // Returns nullopt if the topic has another type or serialisation, or if the message is damaged.

@@ -89,12 +89,13 @@ std::optional<ImageMessage> parse_protobuf_image(bool compressed, std::string_vi
   const std::uint32_t data = compressed ? 2 : 6, encoding = compressed ? 3 : 4, frame = compressed ? 4 : 7;
   ImageMessage out;
   out.compressed = compressed;
-  bool timed = false;
+  std::optional<bool> valid_time;
+  bool whole = true;
   ByteReader in(message);
   while (const auto field = next_field(in)) {
     if (field->number == 1 && field->wire == 2) {
       const auto time = parse_time(field->bytes);
-      timed = time.has_value();
+      valid_time = time.has_value();
       out.stamp_ns = time.value_or(0);
     }
     if (field->number == encoding && field->wire == 2) out.encoding = field->bytes;
@@ -103,12 +104,15 @@ std::optional<ImageMessage> parse_protobuf_image(bool compressed, std::string_vi
       out.data_at = field->at;
       out.data_size = field->value;
     }
+    whole &= field->wire != 2 || field->bytes.size() == field->value;
     if (compressed || field->wire != 5) continue;
     if (field->number == 2) out.width = static_cast<std::uint32_t>(field->value);
     if (field->number == 3) out.height = static_cast<std::uint32_t>(field->value);
     if (field->number == 5) out.step = static_cast<std::uint32_t>(field->value);
   }
-  return in.ok() && timed ? std::optional(std::move(out)) : std::nullopt;
+  // Only a message that is complete tells that it has no time stamp.
+  const bool good = in.ok() && valid_time.value_or(whole && out.data_at > 0);
+  return good ? std::optional(std::move(out)) : std::nullopt;
 }
 
 std::optional<CameraInfo> parse_protobuf_calibration(std::string_view message) {

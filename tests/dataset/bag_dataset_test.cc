@@ -390,6 +390,27 @@ TEST_F(SmallBag, WithoutStampsTheTimesOfRecordingAreUsed) {
   EXPECT_EQ(dataset->first_time_ns, support::kSmallStart + 3'000'000);
 }
 
+// Writers of protocol buffers leave out what is not set.
+TEST_F(SmallBag, WithoutStampsFoxgloveHasTheTimesOfRecording) {
+  auto all = messages(Wire::kProtobuf);
+  const fs::path file = folder_.path() / "a.mcap";
+  for (TestMessage& message : all) {
+    message.type = "foxglove.RawImage";
+    message.bytes.erase(0, 2 + static_cast<std::size_t>(message.bytes[1]));  // field 1, the first
+  }
+  support::write_text(file, support::mcap_bytes(all, Wire::kProtobuf));
+  const auto dataset = open_dataset(request(file));
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(dataset->frames.size(), static_cast<std::size_t>(support::kSmallFrames));
+  EXPECT_TRUE(has(dataset->warnings, "the times of recording are used"));
+  EXPECT_FALSE(has(dataset->warnings, "damaged"));
+  EXPECT_EQ(dataset->first_time_ns, support::kSmallStart + 3'000'000);
+  EXPECT_EQ(read_frame(*dataset, 3).images[1].image.row(0)[5], static_cast<std::uint8_t>(pixels(1, 3)[5]));
+  all[4].bytes.resize(all[4].bytes.size() / 2);
+  support::write_text(file, support::mcap_bytes(all, Wire::kProtobuf));
+  EXPECT_TRUE(has(open_dataset(request(file))->warnings, "1 messages are damaged"));
+}
+
 TEST_F(SmallBag, ImagesWithoutAStampAreNeitherUsedNorDescribed) {
   auto all = messages(Wire::kRos1);
   support::TestImage one = image(0, 2);
