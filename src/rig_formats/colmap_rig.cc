@@ -31,14 +31,15 @@ struct ColmapModel {
   std::string_view name, model;
   std::size_t focal_lengths, coefficients, ours;
 };
-constexpr std::array<ColmapModel, 8> kModels = {{{"SIMPLE_PINHOLE", camera::Pinhole::kName, 1, 0, 0},
+constexpr std::array<ColmapModel, 9> kModels = {{{"SIMPLE_PINHOLE", camera::Pinhole::kName, 1, 0, 0},
                                                  {"PINHOLE", camera::Pinhole::kName, 2, 0, 0},
                                                  {"SIMPLE_RADIAL", camera::PinholeRadTan::kName, 1, 1, 4},
                                                  {"RADIAL", camera::PinholeRadTan::kName, 1, 2, 4},
                                                  {"OPENCV", camera::PinholeRadTan::kName, 2, 4, 4},
                                                  {"FULL_OPENCV", camera::PinholeRadTan::kName, 2, 8, 8},
                                                  {"OPENCV_FISHEYE", camera::KannalaBrandt::kName, 2, 4, 4},
-                                                 {"FOV", camera::Fov::kName, 2, 1, 1}}};
+                                                 {"FOV", camera::Fov::kName, 2, 1, 1},
+                                                 {"EUCM", camera::ExtendedUnified::kName, 2, 2, 2}}};
 
 // File and line of a text, for errors.
 struct Place {

@@ -15,7 +15,7 @@ namespace bslam::rig_formats {
 // the cameras of cameras.txt in the order of their ids, and whose camera_params take precedence. Camera names are the
 // image folders in rig_config.json. A single camera needs neither file. The body frame is the rig frame. Pixel (0.5,
 // 0.5) of COLMAP is pixel (0, 0) here. Models: SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, FULL_OPENCV,
-// OPENCV_FISHEYE, FOV.
+// OPENCV_FISHEYE, FOV, EUCM.
 Result<camera::RigReading> read_colmap_rig(const std::filesystem::path& folder);
 
 // Returns name and content of cameras.txt, rigs.txt and rig_config.json. Camera 0 is the reference sensor. When read

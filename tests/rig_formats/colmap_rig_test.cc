@@ -54,6 +54,15 @@ TEST_F(ColmapRig, HoldsTheFieldOfViewModel) {
   EXPECT_EQ(read_folder("1 FOV 640 480 300 301 320 240 4\n", "", "").error().expected, "w in [1e-06, 3.14]");
 }
 
+TEST_F(ColmapRig, HasTheExtendedUnifiedModelOfExportedMaps) {
+  const auto file = read_folder("1 EUCM 752 480 300 301 376 240 0.5 1.1\n", "", "");
+  ASSERT_TRUE(file) << file.error().message();
+  const camera::Camera& camera = file->rig.camera(index(0));
+  EXPECT_EQ(camera::model_name(camera.model), "eucm");
+  EXPECT_EQ(camera::distortion(camera.model), (std::vector{0.5, 1.1}));
+  EXPECT_EQ(camera::intrinsics(camera.model).cx, 375.5);
+}
+
 TEST_F(ColmapRig, IsReadFromItsRigConfiguration) {
   const std::string config = R"([{"cameras": [{"image_prefix": "rig1/left/", "ref_sensor": true},
     {"image_prefix": "rig1/right/", "cam_from_rig_rotation": [0.7071067811865475, 0.0, 0.7071067811865476, 0.0],
