@@ -183,7 +183,8 @@ void RosBag1::scan_chunk(std::uint32_t chunk) {
   if (end < chunks()[chunk].size) note_cut_chunk(chunk, end);
 }
 
-// Adds the messages of one connection in the last chunk. Returns false if the record is not an index.
+// Adds the messages of one connection in the last chunk, unless the chunk was scanned already. Returns false if the
+// record is damaged: a field is missing, or the number of entries does not agree with its size.
 bool RosBag1::add_index(const Record& record) {
   if (!has_open_chunk()) return true;  // the chunk was scanned
   const auto conn = number<std::uint32_t>(record.fields, "conn");

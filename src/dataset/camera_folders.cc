@@ -98,7 +98,7 @@ std::string not_used(const fs::path& data, const std::vector<std::string>& names
                      why);
 }
 
-// Returns a note that lists the other folders with images.
+// Adds a warning that lists the other folders with images.
 void warn_of_others(const fs::path& data, CameraFolders& out) {
   std::vector<std::string> others;
   for (const CameraFolder& folder : all_folders(data)) {
@@ -127,7 +127,7 @@ Result<CameraFolders> find_camera_folders(const fs::path& data, const std::vecto
     }
   }
   if (!left_out.empty())
-    out.warnings.push_back(not_used(data, left_out, ", since their names are those of depth images or masks"));
+    out.warnings.push_back(not_used(data, left_out, ", since their names contain depth, mask or vignette"));
   if (out.cameras.empty() && !image_files_of(data).empty()) {
     std::error_code error;
     const fs::path whole = fs::weakly_canonical(data, error);

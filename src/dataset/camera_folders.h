@@ -21,7 +21,7 @@ struct CameraFolders {
 };
 
 // Returns the folders cam0, cam1, ..., or left and right; else all sub-folders with images in the natural order of
-// their names, without those of depth images and masks, by their names; else the folder itself. `requested` are names
+// their names, without those whose names contain depth, mask or vignette; else the folder itself. `requested` are names
 // of sub-folders in the order of the cameras; empty: all. Errors: a requested folder that has no images, or is named
 // twice. No cameras if there are no images.
 Result<CameraFolders> find_camera_folders(const std::filesystem::path& data, const std::vector<std::string>& requested);

@@ -90,7 +90,7 @@ class KittiRecording : public Recording {
         image_files::in_time_order(std::move(images), (root_ / "times.txt").string(), image_files::StampUnit::kSeconds);
     if (without_time > 0) {
       list.warnings.push_back(
-          fmt::format("{}: {} images are not listed in times.txt and are not used", folder.string(), without_time));
+          fmt::format("{}: {} images have no time in times.txt and are not used", folder.string(), without_time));
     }
     return list;
   }

@@ -135,6 +135,7 @@ TEST_F(ImageFolders, DepthImagesAndMasksAreLeftOut) {
   ASSERT_TRUE(dataset) << dataset.error().message();
   EXPECT_EQ(folder_of(*dataset, 0), "rgb");
   EXPECT_TRUE(has_text(dataset->warnings, "images in depth, masks are not used"));
+  EXPECT_TRUE(has_text(dataset->warnings, "since their names contain depth, mask or vignette"));
   EXPECT_TRUE(open({"camera"}, {"depth"}));
 }
 
