@@ -3,8 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <string_view>
+#include <optional>
 #include <system_error>
+#include <utility>
 
 #include "base/atomic_file.h"
 #include "containers/message_file.h"
@@ -23,12 +24,22 @@ bool natural_less(const fs::path& a, const fs::path& b) {
   return x.size() != y.size() ? x.size() < y.size() : x < y;
 }
 
+// Recorders that compress whole files add .zstd to their names. Returns the decompressed file beside such a file;
+// nullopt if there is none.
+std::optional<fs::path> decompressed(const fs::path& file) {
+  std::error_code error;
+  if (file.extension() != ".zstd") return std::nullopt;
+  fs::path plain = file.parent_path() / file.stem();
+  return fs::is_regular_file(plain, error) ? std::optional(std::move(plain)) : std::nullopt;
+}
+
 std::vector<fs::path> message_files_in(const fs::path& folder) {
   std::vector<fs::path> files;
   std::error_code error;
   for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
     std::error_code unreadable;
-    if (containers::has_message_file_name(it->path()) && it->is_regular_file(unreadable)) files.push_back(it->path());
+    if (containers::has_message_file_name(it->path()) && it->is_regular_file(unreadable) && !decompressed(it->path()))
+      files.push_back(it->path());
   }
   std::ranges::sort(files, natural_less);
   return files;
@@ -52,15 +63,10 @@ Result<std::vector<std::string>> listed_files(const fs::path& metadata) {
 }
 
 // The file of a bag that metadata.yaml lists. Only its name is used, since old versions of rosbag2 wrote absolute paths
-// on the recording machine. Recorders that compress whole files list the compressed ones; a decompressed one is
-// preferred.
+// on the recording machine.
 fs::path file_in(const fs::path& folder, const std::string& name) {
-  constexpr std::string_view kCompressed = ".zstd";
   const fs::path file = folder / fs::path(name).filename();
-  if (!name.ends_with(kCompressed)) return file;
-  const fs::path plain = folder / file.stem();
-  std::error_code error;
-  return fs::is_regular_file(plain, error) ? plain : file;
+  return decompressed(file).value_or(file);
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <csetjmp>
 #include <cstring>
 #include <memory>
+#include <opencv2/core.hpp>
 #include <vector>
 
 #include "image_decoding/jpeg_warnings.h"

@@ -154,6 +154,9 @@ TEST_F(SmallBag, DecompressedFilesOfRos2AreFound) {
     expect_same(request(folder));
     EXPECT_TRUE(open_dataset(request(folder))->warnings.empty()) << open_dataset(request(folder))->warnings.front();
   }
+  fs::rename(folder / "metadata.yaml", folder_.path() / "metadata.yaml");
+  EXPECT_TRUE(open_dataset(request(folder))->warnings.empty()) << open_dataset(request(folder))->warnings.front();
+  fs::rename(folder_.path() / "metadata.yaml", folder / "metadata.yaml");
   fs::remove(file);
   const auto not_yet = open_dataset(request(folder));
   ASSERT_FALSE(not_yet);

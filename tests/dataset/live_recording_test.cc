@@ -88,7 +88,7 @@ TEST_F(LiveRecordingTest, IsGroupedByTimeWhereItsFramesAreNone) {
 // The order of the topics is that of the rig of the run, so that a rig of its first cameras needs no names of topics.
 TEST_F(LiveRecordingTest, HasAnOrderOfItsTopicsForOtherRigs) {
   write(rig_formats::rig_to_yaml(rig_));
-  support::write_text(folder_.path() / "one.yaml", rig_formats::rig_to_yaml(rig_.subset({0})));
+  support::write_text(folder_.path() / "one.yaml", rig_formats::rig_to_yaml(rig_.subset(std::vector{0})));
   const auto data = open_dataset({.path = path(), .rig_file = folder_.path() / "one.yaml"});
   ASSERT_TRUE(data.ok()) << data.error().message();
   EXPECT_EQ(data->sources, std::vector{kTopics[0]});
