@@ -4,11 +4,10 @@
 #include <cmath>
 
 #include "base/assert.h"
+#include "calibration/rig_bundle_adjustment.h"
 
 namespace bslam::calibration {
 namespace {
-
-constexpr double kObservedRatio = 0.5;  // maximum standard deviation of an observed value, relative to the prior's
 
 // Returns the rig whose difference from `calibrated` is `change` (RigInformation), with the timing of `timed`.
 camera::Rig changed(const camera::Rig& calibrated, const Eigen::VectorXd& change, const camera::Rig& timed) {
