@@ -178,7 +178,7 @@ class Recall {
   Outcome answer(const View& now, const std::vector<KeyframeId>& places) {
     Outcome outcome = Outcome::kNoCandidate;
     note_.clear();
-    for (const looping::Candidate& candidate : recogniser_.query_keyframe(map_, now.keyframe)) {
+    for (const looping::PlaceCandidate& candidate : recogniser_.query_keyframe(map_, now.keyframe)) {
       const auto old = std::ranges::find(views_, candidate.keyframe, &View::keyframe);
       if (old == views_.end() || !old_enough(now, old->time_ns)) continue;
       const bool right_place = std::ranges::find(places, candidate.keyframe) != places.end();

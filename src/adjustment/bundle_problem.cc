@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <tuple>
+#include <utility>
 
 namespace bslam::adjustment {
 namespace {
@@ -12,12 +14,12 @@ constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
 // Adds the observations of one landmark, unless fewer than two keyframes of the problem observe it: such a landmark
 // does not constrain the poses. `pose_index`: as index_by_keyframe.
 void add_landmark(const map::BundledMap& map, LandmarkId id, const std::vector<int>& pose_index,
-                  const feature::FeatureModel& features, BundleProblem& flat) {
+                  const feature::FeatureModel& features, BundleProblem& selected) {
   const auto observations = map.observations(id);
   const auto seen = std::count_if(observations.begin(), observations.end(),
                                   [&](const map::Observation& o) { return pose_index[o.keyframe.index()] >= 0; });
   if (seen < 2) return;
-  const int point = static_cast<int>(flat.landmarks.size());
+  const int point = static_cast<int>(selected.landmarks.size());
   std::size_t reference = kNone;
   float min_sigma = std::numeric_limits<float>::infinity();  // among observations aligned to the reference patch
   for (const map::Observation& o : observations) {
@@ -30,20 +32,21 @@ void add_landmark(const map::BundledMap& map, LandmarkId id, const std::vector<i
       const double detected = features.sigma(keypoints.level[k]);
       const float sigma = o.aligned ? keypoints.sigma[k] : static_cast<float>(detected);
       if (o.aligned && map.landmark(id).reference == map::LandmarkReference{o.keyframe, r}) {
-        reference = flat.problem.observations.size();
+        reference = selected.problem.observations.size();
       } else if (o.aligned) {
         min_sigma = std::min(min_sigma, sigma);
       }
-      flat.problem.observations.push_back({pose, point, r.camera, keypoints.pixel[k], sigma});
-      flat.sources.push_back({id, o.keyframe});
+      selected.problem.observations.push_back({pose, point, r.camera, keypoints.pixel[k], sigma});
+      selected.sources.push_back({id, o.keyframe});
     }
   }
   // The reference keypoint defines the landmark, so its detection error is not an error of the observation. It gets the
   // smallest sigma of the keypoints aligned to it, if that is smaller than its own.
   if (reference != kNone)
-    flat.problem.observations[reference].sigma = std::min(flat.problem.observations[reference].sigma, min_sigma);
-  flat.landmarks.push_back(id);
-  flat.problem.points.push_back(map.landmark(id).position);
+    selected.problem.observations[reference].sigma =
+        std::min(selected.problem.observations[reference].sigma, min_sigma);
+  selected.landmarks.push_back(id);
+  selected.problem.points.push_back(map.landmark(id).position);
 }
 
 // The motions with the moves of cameras. A move, T_after_initial T_cam_rig, is the motion
@@ -93,21 +96,32 @@ std::vector<geometry::SE3> motions_without_moves(const map::BundledMap& map, con
 
 BundleProblem build_problem(const map::BundledMap& map, const Selection& selection,
                             const feature::FeatureModel& features) {
-  BundleProblem flat;
-  flat.problem.rig = &map.rig();
-  flat.keyframes = selection.free_keyframes;
-  flat.keyframes.insert(flat.keyframes.end(), selection.fixed_keyframes.begin(), selection.fixed_keyframes.end());
-  std::sort(flat.keyframes.begin(), flat.keyframes.end());
-  for (const KeyframeId k : flat.keyframes) {
-    flat.problem.T_rig_world.push_back(map.keyframe(k).T_rig_world);
-    flat.problem.pose_free.push_back(
+  BundleProblem selected;
+  selected.problem.rig = &map.rig();
+  selected.keyframes = selection.free_keyframes;
+  selected.keyframes.insert(selected.keyframes.end(), selection.fixed_keyframes.begin(),
+                            selection.fixed_keyframes.end());
+  std::sort(selected.keyframes.begin(), selected.keyframes.end());
+  for (const KeyframeId k : selected.keyframes) {
+    selected.problem.T_rig_world.push_back(map.keyframe(k).T_rig_world);
+    selected.problem.pose_free.push_back(
         std::binary_search(selection.free_keyframes.begin(), selection.free_keyframes.end(), k));
   }
-  flat.problem.motion = motions(map, flat.keyframes);
-  flat.problem.twist = twists(map, flat.keyframes);
-  const std::vector<int> pose_index = index_by_keyframe(map, flat.keyframes);
-  for (const LandmarkId l : selection.landmarks) add_landmark(map, l, pose_index, features, flat);
-  return flat;
+  selected.problem.motion = motions(map, selected.keyframes);
+  selected.problem.twist = twists(map, selected.keyframes);
+  const std::vector<int> pose_index = index_by_keyframe(map, selected.keyframes);
+  for (const LandmarkId l : selection.landmarks) add_landmark(map, l, pose_index, features, selected);
+  return selected;
+}
+
+void sort_observations(BundleProblem& problem) {
+  using Sourced = std::pair<solver::ReprojectionProblem::Observation, ObservationSource>;
+  std::vector<Sourced> all;
+  for (std::size_t i = 0; i < problem.sources.size(); ++i)
+    all.emplace_back(problem.problem.observations[i], problem.sources[i]);
+  std::ranges::stable_sort(all, {},
+                           [](const Sourced& o) { return std::tuple(o.first.point, o.first.pose, o.first.camera); });
+  for (std::size_t i = 0; i < all.size(); ++i) std::tie(problem.problem.observations[i], problem.sources[i]) = all[i];
 }
 
 }  // namespace bslam::adjustment

@@ -47,4 +47,7 @@ std::vector<geometry::SE3> motions_without_moves(const map::BundledMap& map, con
 BundleProblem build_problem(const map::BundledMap& map, const Selection& selection,
                             const feature::FeatureModel& features);
 
+// Sorts the observations, with their sources, by point, pose and camera, which is the order of build_problem.
+void sort_observations(BundleProblem& problem);
+
 }  // namespace bslam::adjustment

@@ -33,17 +33,11 @@ struct AdjustmentOptions {
   }
 };
 
-struct AdjustmentReport {
-  bool done = false;                        // false: nothing to adjust, or the solver failed; the draft is unchanged
-  std::size_t observations = 0;             // number of keypoints
-  std::size_t outliers = 0;                 // number of features removed from their landmark
-  double initial_cost = 0, final_cost = 0;  // robust cost before and after the robust round
-};
-
 // Adjusts the free keyframes and the landmarks, using the observations of all cameras, in two rounds. Writes poses with
 // their uncertainties (adjustment/pose_uncertainty.h), positions and the removal of outlier observations to the draft.
-// `features` determines the standard deviation of a keypoint that is not aligned to its landmark's patch.
-AdjustmentReport adjust_map(const Selection& selection, const AdjustmentOptions& options,
-                            const feature::FeatureModel& features, map::MapDraft& draft, std::stop_token stop = {});
+// `features` determines the standard deviation of a keypoint that is not aligned to its landmark's patch. Returns false
+// if there is nothing to adjust, or the solver failed; the draft is unchanged then.
+bool adjust_map(const Selection& selection, const AdjustmentOptions& options, const feature::FeatureModel& features,
+                map::MapDraft& draft, std::stop_token stop = {});
 
 }  // namespace bslam::adjustment

@@ -28,18 +28,19 @@ namespace bslam::adjustment {
 using PoseUncertainties = std::vector<std::pair<KeyframeId, geometry::PoseUncertainty>>;
 
 // Indices, among the poses of the problem, of the selection's keyframes `with_uncertainty`.
-std::vector<int> poses_with_uncertainty(const Selection& selection, const BundleProblem& flat);
+std::vector<int> poses_with_uncertainty(const Selection& selection, const BundleProblem& selected);
 
 // solver::BundleOptions::fixed_effects, relative to the anchor: F_f - Ad(T_fa) F_a of each fixed keyframe f. An error
 // of the scale, for example, changes their distances, although they drift together. Empty if there is at most one in
 // each submap, or none has an effect.
-std::vector<geometry::PoseUncertainty::Effect> fixed_effects(const map::BundledMap& map, const BundleProblem& flat,
+std::vector<geometry::PoseUncertainty::Effect> fixed_effects(const map::BundledMap& map, const BundleProblem& selected,
                                                              Eigen::Index columns);
 
 // Returns the uncertainties of T_rig_world, in radians and map units, of the keyframes at these poses. `marginals`: M
 // and F of each, as in solver::BundleSummary; keyframes without one are left out. `map` has the uncertainties of the
 // fixed keyframes.
-PoseUncertainties pose_uncertainties(const map::BundledMap& map, const BundleProblem& flat, std::span<const int> poses,
+PoseUncertainties pose_uncertainties(const map::BundledMap& map, const BundleProblem& selected,
+                                     std::span<const int> poses,
                                      std::span<const std::optional<geometry::PoseUncertainty>> marginals,
                                      double correlated_observations);
 

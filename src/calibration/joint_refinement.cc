@@ -5,11 +5,10 @@
 #include <cmath>
 
 #include "base/assert.h"
+#include "calibration/rig_bundle_adjustment.h"
 
 namespace bslam::calibration {
 namespace {
-
-constexpr double kObservedRatio = 0.5;  // maximum standard deviation of an observed value, relative to the prior's
 
 // Returns the rig whose difference from `calibrated` is `change` (RigInformation), with the timing of `timed`. The pose
 // of camera 0 on the body stays as given, while that of a rig refined during a run is corrected for a change of its

@@ -1,7 +1,6 @@
 #include "calibration/lost_observations.h"
 
 #include <algorithm>
-#include <tuple>
 #include <utility>
 
 #include "map/search_points.h"
@@ -12,12 +11,10 @@ namespace {
 
 using Observation = solver::ReprojectionProblem::Observation;
 
-constexpr double kRadius = 0.012;   // rad, search radius around the projection
-constexpr double kMaxChi2 = 100.0;  // ten standard deviations
-constexpr int kMaxHamming = 50;     // bits
-constexpr double kRatio = 0.8;      // maximum ratio of best to second best descriptor distance
-
-std::tuple<int, int, CameraIndex> place_of(const Observation& o) { return {o.point, o.pose, o.camera}; }
+constexpr double kRadius = 0.012;            // rad, search radius around the projection
+constexpr double kMaxRecoveredChi2 = 100.0;  // of observations that are added: ten standard deviations
+constexpr int kMaxHamming = 50;              // bits
+constexpr double kRatio = 0.8;               // maximum ratio of best to second best descriptor distance
 
 bool pixel_before(const Observation& a, const Observation& b) {
   return std::pair(a.pixel.x(), a.pixel.y()) < std::pair(b.pixel.x(), b.pixel.y());
@@ -47,13 +44,6 @@ std::vector<std::vector<Observation>> observations_by_image(const solver::Reproj
   return out;
 }
 
-void sort_observations(adjustment::BundleProblem& flat) {
-  std::vector<std::pair<Observation, adjustment::ObservationSource>> all;
-  for (std::size_t i = 0; i < flat.sources.size(); ++i) all.emplace_back(flat.problem.observations[i], flat.sources[i]);
-  std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return place_of(a.first) < place_of(b.first); });
-  for (std::size_t i = 0; i < all.size(); ++i) std::tie(flat.problem.observations[i], flat.sources[i]) = all[i];
-}
-
 // Keypoints and points that are excluded from the search in the images of one keyframe.
 std::vector<matching::SearchExclusions> known_in(const map::BundledMap& map, KeyframeId keyframe,
                                                  std::span<const std::vector<Observation>> seen, std::size_t points) {
@@ -70,11 +60,11 @@ std::vector<matching::SearchExclusions> known_in(const map::BundledMap& map, Key
 void search_keyframe(const map::BundledMap& map, const camera::Rig& rig, std::size_t pose,
                      std::span<const geometry::SE3> T_cam_world, std::span<const matching::SearchPoint> points,
                      std::span<const std::vector<Observation>> seen, const feature::FeatureModel& features,
-                     adjustment::BundleProblem& flat) {
-  const KeyframeId keyframe = flat.keyframes[pose];
+                     adjustment::BundleProblem& selected) {
+  const KeyframeId keyframe = selected.keyframes[pose];
   const frame::BundledFrame& frame = *map.keyframe(keyframe).frame;
   const geometry::Vector6d& twist =
-      flat.problem.twist.empty() ? map.keyframe(keyframe).twist : flat.problem.twist[pose];
+      selected.problem.twist.empty() ? map.keyframe(keyframe).twist : selected.problem.twist[pose];
   const camera::Rig moving = frame::rig_of(rig, frame, twist);
   const matching::ProjectionSearchOptions options{
       .radius = kRadius, .max_hamming = kMaxHamming, .ratio = kRatio, .scale_factor = features.pyramid.scale_factor};
@@ -87,10 +77,10 @@ void search_keyframe(const map::BundledMap& map, const camera::Rig& rig, std::si
       const auto projected = rig.camera(c).project(
           moving.shutter(c).at_row(T_cam_world[c] * points[m.point].position, static_cast<double>(pixel.y())));
       const double sigma = features.sigma(keypoints.level[m.keypoint.index()]);
-      if (!projected || (pixel.cast<double>() - *projected).squaredNorm() > kMaxChi2 * sigma * sigma) continue;
-      flat.problem.observations.push_back(
+      if (!projected || (pixel.cast<double>() - *projected).squaredNorm() > kMaxRecoveredChi2 * sigma * sigma) continue;
+      selected.problem.observations.push_back(
           {static_cast<int>(pose), static_cast<int>(m.point), CameraIndex(c), pixel, static_cast<float>(sigma)});
-      flat.sources.push_back({flat.landmarks[m.point], keyframe});
+      selected.sources.push_back({selected.landmarks[m.point], keyframe});
     }
   }
 }
@@ -98,14 +88,14 @@ void search_keyframe(const map::BundledMap& map, const camera::Rig& rig, std::si
 }  // namespace
 
 int recover_observations(const map::BundledMap& map, const camera::Rig& rig, const feature::FeatureModel& features,
-                         adjustment::BundleProblem& flat) {
-  const solver::ReprojectionProblem& problem = flat.problem;
+                         adjustment::BundleProblem& selected) {
+  const solver::ReprojectionProblem& problem = selected.problem;
   const std::size_t cameras = rig.size(), before = problem.observations.size();
   const auto seen = observations_by_image(problem, cameras);
-  std::vector<matching::SearchPoint> points = map::search_points(map, flat.landmarks);
+  std::vector<matching::SearchPoint> points = map::search_points(map, selected.landmarks);
   for (std::size_t i = 0; i < points.size(); ++i) points[i].position = problem.points[i];
   std::vector<geometry::SE3> T_cam_world(cameras);
-  for (std::size_t pose = 0; pose < flat.keyframes.size(); ++pose) {
+  for (std::size_t pose = 0; pose < selected.keyframes.size(); ++pose) {
     for (std::size_t c = 0; c < cameras; ++c) {
       const geometry::SE3 T_rig_world = problem.motion.empty()
                                             ? problem.T_rig_world[pose]
@@ -113,10 +103,10 @@ int recover_observations(const map::BundledMap& map, const camera::Rig& rig, con
       T_cam_world[c] = rig.cam_from_rig(c) * T_rig_world;
     }
     search_keyframe(map, rig, pose, T_cam_world, points, std::span(seen).subspan(pose * cameras, cameras), features,
-                    flat);
+                    selected);
   }
-  sort_observations(flat);
-  return static_cast<int>(flat.problem.observations.size() - before);
+  adjustment::sort_observations(selected);
+  return static_cast<int>(selected.problem.observations.size() - before);
 }
 
 }  // namespace bslam::calibration

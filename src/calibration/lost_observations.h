@@ -11,6 +11,6 @@ namespace bslam::calibration {
 // without a landmark in the map and the problem are matched, and only in images in which the point is not observed yet.
 // The thresholds are wide; the next adjustment has to classify the observations. Returns the number of added ones.
 int recover_observations(const map::BundledMap& map, const camera::Rig& rig, const feature::FeatureModel& features,
-                         adjustment::BundleProblem& flat);
+                         adjustment::BundleProblem& selected);
 
 }  // namespace bslam::calibration

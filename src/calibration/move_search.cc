@@ -117,7 +117,7 @@ RigEstimate estimate_significant_moves(const EstimateInput& input, const RigAdju
 
 // Estimates the calibration with a further move.
 RigEstimate estimate_with(const EstimateInput& input, const RigEstimate& before, const PossibleMove& move) {
-  const KeyframeId first = before.problem.flat.keyframes[move.pose];
+  const KeyframeId first = before.problem.selected.keyframes[move.pose];
   MovedCameras more = before.cameras.with_move(before.adjusted.values, move, input.map.keyframe(first).frame->time_ns);
   // The effect of the move may have looked like wrong times, which are tested again.
   const RigAdjustmentOptions prior = prior_with_timing(input, more);

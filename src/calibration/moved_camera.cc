@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <tuple>
 #include <utility>
 
 #include "camera/rolling_shutter.h"
@@ -17,7 +16,7 @@ using geometry::SE3;
 using geometry::Vector6d;
 
 constexpr int kMinObservations = 20, kMinKeyframes = 3;  // before and after a move: keyframes with so many observations
-constexpr double kMaxChi2 = 16 * solver::kChi2TwoDof95;  // of observations that are used
+constexpr double kMaxUsedChi2 = 16 * solver::kChi2TwoDof95;  // of observations that are used
 
 // Normal equations of the extrinsics of a camera.
 struct Equations {
@@ -53,8 +52,8 @@ double cost(const solver::ReprojectionProblem& problem, const solver::RigValues&
   const Eigen::Vector3d point = point_in_camera(problem, values, o, c);
   const auto error = solver::residual_error(values.models[c], point, o.pixel.cast<double>());
   const double sigma = static_cast<double>(o.sigma);
-  const double chi2 = error ? error->squaredNorm() / (sigma * sigma) : kMaxChi2;
-  return solver::huber_cost(std::min(chi2, kMaxChi2));
+  const double chi2 = error ? error->squaredNorm() / (sigma * sigma) : kMaxUsedChi2;
+  return solver::huber_cost(std::min(chi2, kMaxUsedChi2));
 }
 
 // Adds an observation to the equations of its camera in its keyframe.
@@ -67,7 +66,7 @@ void add(const solver::ReprojectionProblem& problem, const solver::RigValues& va
   const double inverse_sigma = 1.0 / static_cast<double>(o.sigma);
   const Eigen::Vector2d e = inverse_sigma * residual->error;
   const double chi2 = e.squaredNorm();
-  if (!(chi2 < kMaxChi2)) return;
+  if (!(chi2 < kMaxUsedChi2)) return;
   const solver::Matrix62d Jt = solver::pose_jacobian_transposed(inverse_sigma * residual->J, point);
   const double weight = solver::huber_weight(chi2);
   sums.H += weight * Jt * Jt.transpose();
@@ -85,19 +84,13 @@ std::pair<Vector6d, double> best_change(const Equations& all, const Equations& a
   return {change, b.dot(change)};
 }
 
-void sort_observations(RigProblem& problem) {
-  // All observations of a point by one pose have the same source, so that sources stay in order.
-  std::ranges::stable_sort(problem.flat.problem.observations, {},
-                           [](const auto& o) { return std::tuple(o.point, o.pose, o.camera); });
-}
-
 TimeNs time_of(const map::BundledMap& map, const RigProblem& problem, std::size_t pose) {
-  return map.keyframe(problem.flat.keyframes[pose]).frame->time_ns;
+  return map.keyframe(problem.selected.keyframes[pose]).frame->time_ns;
 }
 
 // The poses of the problem in order of time, which is not always that of their creation.
 std::vector<std::size_t> poses_by_time(const map::BundledMap& map, const RigProblem& problem) {
-  std::vector<std::size_t> out(problem.flat.keyframes.size());
+  std::vector<std::size_t> out(problem.selected.keyframes.size());
   std::iota(out.begin(), out.end(), 0);
   std::ranges::stable_sort(out, {}, [&](std::size_t pose) { return time_of(map, problem, pose); });
   return out;
@@ -180,35 +173,35 @@ RigInformation MovedCameras::of_rig(const RigInformation& information) const {
 
 void MovedCameras::separate(const map::BundledMap& map, RigProblem& problem) const {
   if (moves_.empty()) return;
-  solver::ReprojectionProblem& flat = problem.flat.problem;
-  for (auto& o : flat.observations)
+  solver::ReprojectionProblem& bundle = problem.selected.problem;
+  for (auto& o : bundle.observations)
     o.camera = CameraIndex(camera_at(o.camera.index(), time_of(map, problem, static_cast<std::size_t>(o.pose))));
-  sort_observations(problem);
+  adjustment::sort_observations(problem.selected);
   std::vector<SE3> motion;
-  for (std::size_t k = 0; k < flat.motion.size(); k += cameras_) {
-    for (std::size_t c = 0; c < cameras_; ++c) motion.push_back(flat.motion[k + c]);
-    for (const camera::CameraMove& move : moves_) motion.push_back(flat.motion[k + move.camera]);
+  for (std::size_t k = 0; k < bundle.motion.size(); k += cameras_) {
+    for (std::size_t c = 0; c < cameras_; ++c) motion.push_back(bundle.motion[k + c]);
+    for (const camera::CameraMove& move : moves_) motion.push_back(bundle.motion[k + move.camera]);
   }
-  flat.motion = std::move(motion);
+  bundle.motion = std::move(motion);
 }
 
 void MovedCameras::join(const map::BundledMap& map, const solver::RigValues& values, RigProblem& problem) const {
   if (moves_.empty()) return;
-  solver::ReprojectionProblem& flat = problem.flat.problem;
+  solver::ReprojectionProblem& bundle = problem.selected.problem;
   std::vector<SE3> motion;
-  for (std::size_t pose = 0; pose < problem.flat.keyframes.size(); ++pose) {
+  for (std::size_t pose = 0; pose < problem.selected.keyframes.size(); ++pose) {
     for (std::size_t c = 0; c < cameras_; ++c) {
-      const std::size_t now = camera_at(c, map.keyframe(problem.flat.keyframes[pose]).frame->time_ns);
+      const std::size_t now = camera_at(c, map.keyframe(problem.selected.keyframes[pose]).frame->time_ns);
       SE3& T = motion.emplace_back();
       if (now != c) T = values.T_cam_rig[c].inverse() * values.T_cam_rig[now];
-      if (!flat.motion.empty()) T = T * flat.motion[pose * (cameras_ + moves_.size()) + now];
+      if (!bundle.motion.empty()) T = T * bundle.motion[pose * (cameras_ + moves_.size()) + now];
     }
   }
-  flat.motion = std::move(motion);
-  for (auto& o : flat.observations) {
+  bundle.motion = std::move(motion);
+  for (auto& o : bundle.observations) {
     if (o.camera.index() >= cameras_) o.camera = CameraIndex(moves_[o.camera.index() - cameras_].camera);
   }
-  sort_observations(problem);
+  adjustment::sort_observations(problem.selected);
 }
 
 std::vector<PossibleMove> MovedCameras::likely_moves(const map::BundledMap& map, const RigProblem& problem,
@@ -216,8 +209,8 @@ std::vector<PossibleMove> MovedCameras::likely_moves(const map::BundledMap& map,
   const std::size_t cameras = values.T_cam_rig.size();
   const std::vector<std::size_t> poses = poses_by_time(map, problem);
   std::vector<Equations> equations(poses.size() * cameras);
-  for (const auto& o : problem.flat.problem.observations)
-    add(problem.flat.problem, values, o, equations[static_cast<std::size_t>(o.pose) * cameras + o.camera.index()]);
+  for (const auto& o : problem.selected.problem.observations)
+    add(problem.selected.problem, values, o, equations[static_cast<std::size_t>(o.pose) * cameras + o.camera.index()]);
   std::vector<PossibleMove> out;
   // Of two cameras, the images show the relative extrinsics only.
   for (std::size_t c = cameras_ == 2 ? 1 : 0; c < cameras; ++c) {
@@ -245,10 +238,10 @@ std::vector<camera::CameraMove> MovedCameras::at_best_times(const map::BundledMa
     const std::size_t camera_before = before(m), camera_after = cameras_ + m;
     // Decrease of the cost if a pose was before the move, not after it.
     std::vector<double> benefit(poses.size(), 0);
-    for (const Observation& o : problem.flat.problem.observations) {
+    for (const Observation& o : problem.selected.problem.observations) {
       if (o.camera.index() != camera_before && o.camera.index() != camera_after) continue;
-      benefit[static_cast<std::size_t>(o.pose)] +=
-          cost(problem.flat.problem, values, o, camera_after) - cost(problem.flat.problem, values, o, camera_before);
+      benefit[static_cast<std::size_t>(o.pose)] += cost(problem.selected.problem, values, o, camera_after) -
+                                                   cost(problem.selected.problem, values, o, camera_before);
     }
     double sum = 0, most = 0;
     for (std::size_t i = 0; i + 1 < poses.size(); ++i) {

@@ -16,7 +16,7 @@ constexpr double kMaxDeviation = 0.05;
 // Calls visit(i, step) with the displacement from keyframe i - 1 to keyframe i of the same group.
 template <class Visit>
 void for_each_step(const RigProblem& problem, const Visit& visit) {
-  const std::vector<geometry::SE3>& poses = problem.flat.problem.T_rig_world;
+  const std::vector<geometry::SE3>& poses = problem.selected.problem.T_rig_world;
   for (std::size_t i = 1; i < poses.size(); ++i) {
     if (problem.group[i] == problem.group[i - 1])
       visit(i, Eigen::Vector3d(poses[i].inverse().translation() - poses[i - 1].inverse().translation()));
@@ -32,7 +32,7 @@ double path_length(const RigProblem& problem) {
 }
 
 double path_deviation(const RigProblem& problem, const std::vector<geometry::PoseUncertainty::Effect>& effects) {
-  const std::vector<geometry::SE3>& poses = problem.flat.problem.T_rig_world;
+  const std::vector<geometry::SE3>& poses = problem.selected.problem.T_rig_world;
   BSLAM_ASSERT(effects.size() == poses.size(), "every pose must have an effect");
   if (effects.empty()) return 0;
   Eigen::RowVectorXd sum = Eigen::RowVectorXd::Zero(effects.front().cols());

@@ -11,7 +11,6 @@ namespace bslam::calibration {
 namespace {
 
 constexpr int kDensePoses = 150;
-constexpr double kObservedRatio = 0.5;  // maximum standard deviation of an observed value, relative to the prior's
 
 // Convergence of all rounds but the last: they only determine which observations the next one uses.
 constexpr double kEarlyDecrease = 1e-4;

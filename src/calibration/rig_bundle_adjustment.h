@@ -38,6 +38,9 @@ struct RigAdjustmentOptions {
   double relative_decrease = 1e-6;  // a round has converged if a step decreases the cost by a smaller fraction
 };
 
+// Maximum standard deviation of a value that the images determine, relative to that of the prior.
+inline constexpr double kObservedRatio = 0.5;
+
 // One camera. The six degrees of freedom of the extrinsics are rotation around the camera's x, y, z (radians), then
 // translation along them (metres): the left perturbation of T_cam_rig, which rotates the camera around its own centre.
 struct CameraEstimate {

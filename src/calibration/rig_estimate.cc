@@ -32,12 +32,12 @@ bool converged(const RigAdjustment& adjusted, const solver::RigValues& before) {
 // Adjusts again with the variance of each landmark (adjustment/landmark_noise.h), from the estimate `from`.
 RigAdjustment adjust_weighted(RigAdjustmentOptions options, RigAdjustment from, RigProblem& problem,
                               const std::stop_token& stop) {
-  solver::ReprojectionProblem& flat = problem.flat.problem;
-  const auto chi2 = solver::squared_errors(flat, flat.T_rig_world, flat.points, from.values);
-  adjustment::apply_variances(adjustment::landmark_variances(flat, chi2, solver::beyond(chi2, solver::kChi2TwoDof95)),
-                              flat);
+  solver::ReprojectionProblem& selected = problem.selected.problem;
+  const auto chi2 = solver::squared_errors(selected, selected.T_rig_world, selected.points, from.values);
+  adjustment::apply_variances(
+      adjustment::landmark_variances(selected, chi2, solver::beyond(chi2, solver::kChi2TwoDof95)), selected);
   options.start_is_estimate = true;
-  RigAdjustment out = adjust_rig(flat, options, from.values, stop);
+  RigAdjustment out = adjust_rig(selected, options, from.values, stop);
   if (!out.done) return from;
   out.scale_change *= from.scale_change;
   return out;
@@ -51,14 +51,14 @@ solver::RigValues start_of(const map::BundledMap& map, const MovedCameras& camer
 // Searches for rejected observations again, with the estimated extrinsics.
 int recover(const EstimateInput& input, const MovedCameras& cameras, const solver::RigValues& values,
             RigProblem& problem) {
-  const std::vector<geometry::SE3> motion = problem.flat.problem.motion;
+  const std::vector<geometry::SE3> motion = problem.selected.problem.motion;
   cameras.join(input.map, values, problem);
-  const int recovered =
-      recover_observations(input.map, cameras.of_rig(values).applied_to(input.map.rig()), input.features, problem.flat);
+  const int recovered = recover_observations(input.map, cameras.of_rig(values).applied_to(input.map.rig()),
+                                             input.features, problem.selected);
   if (cameras.moves().empty()) return recovered;
-  problem.flat.problem.motion.clear();
+  problem.selected.problem.motion.clear();
   cameras.separate(input.map, problem);
-  problem.flat.problem.motion = motion;
+  problem.selected.problem.motion = motion;
   return recovered;
 }
 
@@ -70,12 +70,12 @@ RigAdjustment adjust_in_passes(const EstimateInput& input, const RigAdjustmentOp
   coarse.relative_decrease = kCoarseDecrease;
   solver::RigValues before = start_of(input.map, cameras);
   separate_groups(problem);
-  RigAdjustment out = adjust_rig(problem.flat.problem, coarse, before, input.stop);
+  RigAdjustment out = adjust_rig(problem.selected.problem, coarse, before, input.stop);
   for (int pass = 1; pass < kPasses && out.done && !converged(out, before); ++pass) {
     before = out.values;
     if (recover(input, cameras, before, problem) == 0) break;
     separate_groups(problem);
-    RigAdjustment again = adjust_rig(problem.flat.problem, coarse, before, input.stop);
+    RigAdjustment again = adjust_rig(problem.selected.problem, coarse, before, input.stop);
     if (!again.done) break;
     again.scale_change *= out.scale_change;
     out = std::move(again);
@@ -101,13 +101,13 @@ RigAdjustmentOptions prior_with_timing(const EstimateInput& input, const MovedCa
   RigAdjustmentOptions prior = prior_without_timing(input.calibrated, input.options);
   const camera::Rig reference = cameras.added_to(with_time_offsets_of(input.map.rig(), input.calibrated));
   RigProblem problem = choose(input.map, true, quick(input.options), input.features);
-  problem.flat.problem.rig = &reference;
+  problem.selected.problem.rig = &reference;
   cameras.separate(input.map, problem);
   separate_groups(problem);
   RigAdjustmentOptions with_timing = for_verdict(prior);
   with_timing.timing = timing_prior(input.map.rig(), input.calibrated, input.options);
   const auto adjusted =
-      adjust_rig(problem.flat.problem, cameras.added_to(with_timing), start_of(input.map, cameras), input.stop);
+      adjust_rig(problem.selected.problem, cameras.added_to(with_timing), start_of(input.map, cameras), input.stop);
   if (adjusted.done) prior.timing = contradicted(with_timing.timing, input.map.rig(), adjusted, input.options);
   return prior;
 }
@@ -116,7 +116,7 @@ RigEstimate estimate_rig(const EstimateInput& input, const RigAdjustmentOptions&
   RigEstimate out{std::move(cameras), {}, choose(input.map, !prior.timing.empty(), input.options, input.features), {}};
   out.reference = std::make_shared<const camera::Rig>(
       out.cameras.added_to(with_time_offsets_of(input.map.rig(), input.calibrated)));
-  out.problem.flat.problem.rig = out.reference.get();
+  out.problem.selected.problem.rig = out.reference.get();
   out.cameras.separate(input.map, out.problem);
   out.path_before = path_length(out.problem);
   out.adjusted = adjust_in_passes(input, out.cameras.added_to(prior), out.cameras, out.problem);

@@ -25,7 +25,7 @@ SE3 turn_of_rays(const camera::Camera& refined, const camera::Camera& calibrated
 }
 
 void move_to_rig_frame(const SE3& T_cam0_rig, const SE3& before, RigProblem& problem) {
-  std::vector<SE3>& poses = problem.flat.problem.T_rig_world;
+  std::vector<SE3>& poses = problem.selected.problem.T_rig_world;
   const SE3 turn = T_cam0_rig * before.inverse();
   std::vector<SE3> T_old_new(poses.size());  // per group, at the index of its fixed keyframe: the world
   for (std::size_t i = 0; i < poses.size(); ++i) {
@@ -34,9 +34,9 @@ void move_to_rig_frame(const SE3& T_cam0_rig, const SE3& before, RigProblem& pro
   const SE3 T_rig_cam0 = T_cam0_rig.inverse();
   for (std::size_t i = 0; i < poses.size(); ++i) poses[i] = T_rig_cam0 * poses[i] * T_old_new[problem.group[i]];
   int last = -1;
-  for (const auto& o : problem.flat.problem.observations) {
+  for (const auto& o : problem.selected.problem.observations) {
     if (std::exchange(last, o.point) == o.point) continue;
-    Eigen::Vector3d& point = problem.flat.problem.points[static_cast<std::size_t>(o.point)];
+    Eigen::Vector3d& point = problem.selected.problem.points[static_cast<std::size_t>(o.point)];
     point = T_old_new[problem.group[static_cast<std::size_t>(o.pose)]].inverse() * point;
   }
 }

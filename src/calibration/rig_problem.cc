@@ -146,24 +146,25 @@ RigProblem choose(const map::BundledMap& map, bool timing, const CalibrationOpti
   for (std::size_t i = 0; i < keyframes.size(); ++i) {
     (out.group[i] == i ? selection.fixed_keyframes : selection.free_keyframes).push_back(keyframes[i]);
   }
-  out.flat = adjustment::build_problem(map, selection, features);
-  if (!map.rig().moves().empty()) out.flat.problem.motion = adjustment::motions_without_moves(map, out.flat.keyframes);
+  out.selected = adjustment::build_problem(map, selection, features);
+  if (!map.rig().moves().empty())
+    out.selected.problem.motion = adjustment::motions_without_moves(map, out.selected.keyframes);
   const geometry::SE3 &T_cam0_rig = map.rig().cam_from_rig(0), &T_rig_cam0 = map.rig().rig_from_cam(0);
-  for (geometry::SE3& T_cam0_world : out.flat.problem.T_rig_world) T_cam0_world = T_cam0_rig * T_cam0_world;
-  for (geometry::SE3& motion : out.flat.problem.motion) motion = T_cam0_rig * motion * T_rig_cam0;
-  if (!timing && out.flat.problem.twist.empty()) return out;  // no camera has a rolling shutter
-  out.flat.problem.twist.clear();
+  for (geometry::SE3& T_cam0_world : out.selected.problem.T_rig_world) T_cam0_world = T_cam0_rig * T_cam0_world;
+  for (geometry::SE3& motion : out.selected.problem.motion) motion = T_cam0_rig * motion * T_rig_cam0;
+  if (!timing && out.selected.problem.twist.empty()) return out;  // no camera has a rolling shutter
+  out.selected.problem.twist.clear();
   const Eigen::Matrix3d R_cam0_rig = T_cam0_rig.matrix3();
-  for (const KeyframeId k : out.flat.keyframes) {
+  for (const KeyframeId k : out.selected.keyframes) {
     geometry::Vector6d twist = map.keyframe(k).twist;
     twist << R_cam0_rig * twist.head<3>(), R_cam0_rig * twist.tail<3>();
-    out.flat.problem.twist.push_back(twist);
+    out.selected.problem.twist.push_back(twist);
   }
   return out;
 }
 
 void separate_groups(RigProblem& problem) {
-  std::vector<solver::ReprojectionProblem::Observation>& observations = problem.flat.problem.observations;
+  std::vector<solver::ReprojectionProblem::Observation>& observations = problem.selected.problem.observations;
   std::vector<int> count(problem.group.size());
   std::size_t kept = 0;
   for (std::size_t begin = 0, end = 0; begin < observations.size(); begin = end) {
@@ -174,12 +175,12 @@ void separate_groups(RigProblem& problem) {
     const auto most = static_cast<std::size_t>(std::max_element(count.begin(), count.end()) - count.begin());
     for (std::size_t o = begin; o < end; ++o) {
       if (group_of(o) != most) continue;
-      problem.flat.sources[kept] = problem.flat.sources[o];
+      problem.selected.sources[kept] = problem.selected.sources[o];
       observations[kept++] = observations[o];
     }
   }
   observations.resize(kept);
-  problem.flat.sources.resize(kept);
+  problem.selected.sources.resize(kept);
 }
 
 }  // namespace bslam::calibration

@@ -10,7 +10,7 @@ namespace bslam::calibration {
 
 // The adjustment problem and the group of each of its poses.
 struct RigProblem {
-  adjustment::BundleProblem flat;
+  adjustment::BundleProblem selected;
   std::vector<std::size_t> group;
 };
 

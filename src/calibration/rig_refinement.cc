@@ -52,12 +52,12 @@ void evaluate_timing(const CameraEstimate& estimate, CameraRefinement& out) {
   out.readout = in_ms(estimate.timing_change.readout_s, estimate.timing_sigma.readout_s);
 }
 
-map::SetPoses poses_of(const adjustment::BundleProblem& flat) {
+map::SetPoses poses_of(const adjustment::BundleProblem& bundle) {
   map::SetPoses out;
-  for (std::size_t i = 0; i < flat.keyframes.size(); ++i)
-    out.keyframes.emplace_back(flat.keyframes[i], flat.problem.T_rig_world[i]);
-  for (std::size_t i = 0; i < flat.landmarks.size(); ++i) {
-    if (flat.problem.points[i].allFinite()) out.landmarks.emplace_back(flat.landmarks[i], flat.problem.points[i]);
+  for (std::size_t i = 0; i < bundle.keyframes.size(); ++i)
+    out.keyframes.emplace_back(bundle.keyframes[i], bundle.problem.T_rig_world[i]);
+  for (std::size_t i = 0; i < bundle.landmarks.size(); ++i) {
+    if (bundle.problem.points[i].allFinite()) out.landmarks.emplace_back(bundle.landmarks[i], bundle.problem.points[i]);
   }
   return out;
 }
@@ -101,8 +101,8 @@ void evaluate_scale(const EstimateInput& input, const RigEstimate& estimate, Rig
 RigRefinement evaluate(const EstimateInput& input, RigEstimate&& estimate) {
   RigRefinement out;
   RigAdjustment& adjusted = estimate.adjusted;
-  out.keyframes = estimate.problem.flat.keyframes.size();
-  out.landmarks = estimate.problem.flat.landmarks.size();
+  out.keyframes = estimate.problem.selected.keyframes.size();
+  out.landmarks = estimate.problem.selected.landmarks.size();
   if (!adjusted.done) return out;
   const camera::Rig reference = with_time_offsets_of(input.map.rig(), input.calibrated);
   const std::vector<camera::CameraMove>& of_estimate = estimate.cameras.moves();
@@ -131,7 +131,7 @@ RigRefinement evaluate(const EstimateInput& input, RigEstimate&& estimate) {
       turn_of_rays(refined.camera(0), reference.camera(0)) * input.calibrated.cam_from_rig(0);
   out.rig = with_rig_frame(refined, T_cam0_rig, input.calibrated.body_from_rig()).with_moves(moves);
   move_to_rig_frame(T_cam0_rig, input.map.rig().cam_from_rig(0), estimate.problem);
-  out.poses = poses_of(estimate.problem.flat);
+  out.poses = poses_of(estimate.problem.selected);
   return out;
 }
 

@@ -123,7 +123,6 @@ std::optional<GeneralisedScale> generalised_scale(const SE3& T_b_a, std::span<co
   const Motion& best = *std::ranges::min_element(motions, {}, [](const Motion& m) { return m.sums.cost; });
   const Sums& sums = best.sums;
   out.T_b_a = best.T_b_a;
-  out.num_inliers = sums.inliers;
   const double distance = out.T_b_a.translation().norm();
   if (sums.inliers <= 6 || !(distance > 0.0)) return std::nullopt;
   const Eigen::LDLT<Matrix6d> factor(sums.H);

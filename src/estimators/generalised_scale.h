@@ -25,7 +25,6 @@ struct GeneralisedScaleOptions {
 struct GeneralisedScale {
   geometry::SE3 T_b_a;     // reference camera, metres
   double deviation = 0.0;  // relative standard deviation of the distance
-  int num_inliers = 0;
 };
 
 // `T_b_a`: motion of the reference, with a translation of any length. Refines rotation and translation together, so

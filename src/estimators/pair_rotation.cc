@@ -70,7 +70,6 @@ PairRotation pair_rotation(const EpipolarPose& given, std::span<const BearingPai
   };
   for (double scale = kFirstScale; scale > options.tolerance; scale *= kShrink) advance(scale);
   for (int i = 0; i < kLastSteps; ++i) advance(options.tolerance);
-  out.angle = geometry::so3_log(Eigen::Quaterniond(out.correction)).norm();
   out.agreed = epipolar_agreement(given, pairs, options.tolerance).all;
   const EpipolarAgreement found =
       epipolar_agreement({out.correction * given.R_b_a, out.correction * given.t_b_a}, pairs, options.tolerance);

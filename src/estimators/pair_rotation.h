@@ -13,7 +13,6 @@ struct PairRotationOptions {
 
 struct PairRotation {
   Eigen::Matrix3d correction = Eigen::Matrix3d::Identity();  // R_b_a = correction * R_b_a as given, t_b_a likewise
-  double angle = 0;                                          // angle of the correction, rad
   // Matches that agree without and with the correction: on the epipolar plane, and in front of both cameras or too far
   // away to have a depth. `with_depth`: those of the latter that are not too far away.
   int agreed = 0, agree = 0, with_depth = 0;

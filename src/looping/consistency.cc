@@ -22,12 +22,12 @@ bool intersect(const std::vector<KeyframeId>& a, const std::vector<KeyframeId>& 
 
 }  // namespace
 
-std::vector<Candidate> consistent_candidates(const map::BundledMap& map, KeyframeId keyframe,
-                                             const std::vector<Candidate>& candidates, const LoopOptions& options,
-                                             RecognitionHistory& history) {
+std::vector<PlaceCandidate> consistent_candidates(const map::BundledMap& map, KeyframeId keyframe,
+                                                  const std::vector<PlaceCandidate>& candidates,
+                                                  const LoopOptions& options, RecognitionHistory& history) {
   RecognitionHistory next;
-  std::vector<Candidate> out;
-  for (const Candidate& candidate : candidates) {
+  std::vector<PlaceCandidate> out;
+  for (const PlaceCandidate& candidate : candidates) {
     RecognitionHistory::Place place{covisible_group(map, candidate.keyframe), 1, keyframe};
     for (const RecognitionHistory::Place& before : history.places) {
       if (keyframe.value() - before.last.value() <= options.max_keyframe_gap &&

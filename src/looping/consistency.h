@@ -20,8 +20,8 @@ struct RecognitionHistory {
 
 // Returns the candidates of `keyframe` whose place was recognised by enough consecutive keyframes, this one included.
 // Records all candidates in `history`.
-std::vector<Candidate> consistent_candidates(const map::BundledMap& map, KeyframeId keyframe,
-                                             const std::vector<Candidate>& candidates, const LoopOptions& options,
-                                             RecognitionHistory& history);
+std::vector<PlaceCandidate> consistent_candidates(const map::BundledMap& map, KeyframeId keyframe,
+                                                  const std::vector<PlaceCandidate>& candidates,
+                                                  const LoopOptions& options, RecognitionHistory& history);
 
 }  // namespace bslam::looping

@@ -56,7 +56,7 @@ LoopCloser::LoopCloser(std::unique_ptr<PlaceRecogniser> recogniser, const Loopin
     : recogniser_(std::move(recogniser)), options_(options), features_(features), seed_(seed) {}
 
 std::optional<PlaceMatch> LoopCloser::verify(KeyframeId keyframe, const map::BundledMap& map,
-                                             const Candidate& candidate, JoinAttempts& attempts) const {
+                                             const PlaceCandidate& candidate, JoinAttempts& attempts) const {
   const Random random(seed_, "loop", static_cast<std::uint64_t>(keyframe.value()));
   VerificationReport report;
   auto place_match = verify_place(map, map.rig_of(keyframe), *map.keyframe(keyframe).frame, candidate.keyframe,
@@ -76,7 +76,7 @@ bool LoopCloser::is_unambiguous(KeyframeId keyframe, const map::BundledMap& map,
   map::BundledMap rest = map;
   rest.remove_submap(map.root_of(keyframe));
   const Random random(seed_, "rival", static_cast<std::uint64_t>(keyframe.value()));
-  return std::ranges::none_of(recogniser_->query_frame(rest, *frame), [&](const Candidate& candidate) {
+  return std::ranges::none_of(recogniser_->query_frame(rest, *frame), [&](const PlaceCandidate& candidate) {
     const auto other = verify_place(rest, rig, *frame, candidate.keyframe, options_.verification, features_, random);
     return other && contradicts(rest, place_match, *other);
   });
@@ -99,10 +99,10 @@ LoopCloser::Found LoopCloser::closure_at(KeyframeId keyframe, const map::Bundled
 
 LoopCloser::Found LoopCloser::find(KeyframeId keyframe, const map::BundledMap& map, JoinAttempts& attempts) {
   const auto joined = joined_.find(map, keyframe, options_);
-  const std::vector<Candidate> candidates = recogniser_->query_keyframe(map, keyframe);
-  for (const Candidate& candidate : candidates)
+  const std::vector<PlaceCandidate> candidates = recogniser_->query_keyframe(map, keyframe);
+  for (const PlaceCandidate& candidate : candidates)
     give_up(map, keyframe, candidate.keyframe, JoinStage::kNotConsistent, attempts);
-  for (const Candidate& candidate : consistent_candidates(map, keyframe, candidates, options_.loop, history_)) {
+  for (const PlaceCandidate& candidate : consistent_candidates(map, keyframe, candidates, options_.loop, history_)) {
     give_up(map, keyframe, candidate.keyframe, JoinStage::kNotVerified, attempts);
     auto place_match = verify(keyframe, map, candidate, attempts);
     if (!place_match) continue;

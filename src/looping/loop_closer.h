@@ -56,7 +56,7 @@ class LoopCloser {
   std::size_t memory_bytes() const { return recogniser_->memory_bytes(); }
 
  private:
-  std::optional<PlaceMatch> verify(KeyframeId keyframe, const map::BundledMap& map, const Candidate& candidate,
+  std::optional<PlaceMatch> verify(KeyframeId keyframe, const map::BundledMap& map, const PlaceCandidate& candidate,
                                    JoinAttempts& attempts) const;
   bool is_unambiguous(KeyframeId keyframe, const map::BundledMap& map, const PlaceMatch& place_match) const;
   using Found = std::optional<std::pair<PlaceMatch, LoopClosure>>;

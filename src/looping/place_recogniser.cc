@@ -30,12 +30,12 @@ class Groups {
 
   // Returns the groups by decreasing score, one per call; nullopt after the last one. Only scores that can be the next
   // highest are computed.
-  std::optional<Candidate> next() {
+  std::optional<PlaceCandidate> next() {
     while (!next_.empty()) {
       std::ranges::pop_heap(next_, later);
       Group& top = next_.back();
       if (top.final) {
-        const Candidate out{top.keyframe, top.score};
+        const PlaceCandidate out{top.keyframe, top.score};
         next_.pop_back();
         return out;
       }
@@ -155,7 +155,7 @@ void BagOfWordsRecogniser::sync(const map::BundledMap& map) {
   if (many) map.release_pages();
 }
 
-std::vector<Candidate> BagOfWordsRecogniser::query_keyframe(const map::BundledMap& map, KeyframeId keyframe) {
+std::vector<PlaceCandidate> BagOfWordsRecogniser::query_keyframe(const map::BundledMap& map, KeyframeId keyframe) {
   sync(map);
   const Words words = index_.words_of(keyframe);
   std::vector<std::uint8_t> excluded(map.keyframe_slots(), 0);
@@ -172,16 +172,17 @@ std::vector<Candidate> BagOfWordsRecogniser::query_keyframe(const map::BundledMa
   return rank(map, *words, excluded, {options_.min_common_word_ratio, options_.min_group_score_ratio, min_score});
 }
 
-std::vector<Candidate> BagOfWordsRecogniser::query_frame(const map::BundledMap& map, const frame::BundledFrame& frame) {
+std::vector<PlaceCandidate> BagOfWordsRecogniser::query_frame(const map::BundledMap& map,
+                                                              const frame::BundledFrame& frame) {
   sync(map);
   return rank(map, *words_of(frame), {},
               {options_.relocalisation_factor * options_.min_common_word_ratio,
                options_.relocalisation_factor * options_.min_group_score_ratio});
 }
 
-std::vector<Candidate> BagOfWordsRecogniser::rank(const map::BundledMap& map, const place::WordVector& words,
-                                                  const std::vector<std::uint8_t>& excluded,
-                                                  const Bounds& bounds) const {
+std::vector<PlaceCandidate> BagOfWordsRecogniser::rank(const map::BundledMap& map, const place::WordVector& words,
+                                                       const std::vector<std::uint8_t>& excluded,
+                                                       const Bounds& bounds) const {
   std::vector<place::CommonWords> sharing = index_.query(words);
   std::erase_if(sharing,
                 [&](const place::CommonWords& c) { return !excluded.empty() && excluded[c.keyframe.index()]; });
@@ -193,12 +194,12 @@ std::vector<Candidate> BagOfWordsRecogniser::rank(const map::BundledMap& map, co
       scores[c.keyframe.index()] = c.score;
   }
   Groups groups(map, scores, options_.group, options_.min_neighbour_landmarks);
-  std::vector<Candidate> out;
+  std::vector<PlaceCandidate> out;
   // A group covers its representative and the neighbours of the representative. Keyframes that share only a few
   // landmarks, for example through a door, count as different places.
   std::vector<std::uint8_t> taken(map.keyframe_slots(), 0);
   while (out.size() < static_cast<std::size_t>(options_.max_candidates)) {
-    const std::optional<Candidate> group = groups.next();
+    const std::optional<PlaceCandidate> group = groups.next();
     if (!group || (!out.empty() && group->score < bounds.min_group_score_ratio * out.front().score)) break;
     if (taken[group->keyframe.index()]) continue;
     out.push_back(*group);

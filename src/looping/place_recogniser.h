@@ -13,7 +13,7 @@
 
 namespace bslam::looping {
 
-struct Candidate {
+struct PlaceCandidate {
   KeyframeId keyframe;
   double score = 0;  // score of its group; candidates are sorted by decreasing score
 };
@@ -31,10 +31,10 @@ class PlaceRecogniser {
   virtual void describe(frame::BundledFrame& frame) const = 0;
 
   // Returns keyframes of `map` that may show the place of `keyframe`, excluding its neighbours.
-  virtual std::vector<Candidate> query_keyframe(const map::BundledMap& map, KeyframeId keyframe) = 0;
+  virtual std::vector<PlaceCandidate> query_keyframe(const map::BundledMap& map, KeyframeId keyframe) = 0;
 
   // Returns keyframes of `map` that may show the place of a frame prepared by describe().
-  virtual std::vector<Candidate> query_frame(const map::BundledMap& map, const frame::BundledFrame& frame) = 0;
+  virtual std::vector<PlaceCandidate> query_frame(const map::BundledMap& map, const frame::BundledFrame& frame) = 0;
 
   // Memory of its index, in bytes.
   virtual std::size_t memory_bytes() const { return 0; }
@@ -46,8 +46,8 @@ class BagOfWordsRecogniser : public PlaceRecogniser {
   BagOfWordsRecogniser(place::VocabularyPtr vocabulary, const RecognitionOptions& options);
 
   void describe(frame::BundledFrame& frame) const override;
-  std::vector<Candidate> query_keyframe(const map::BundledMap& map, KeyframeId keyframe) override;
-  std::vector<Candidate> query_frame(const map::BundledMap& map, const frame::BundledFrame& frame) override;
+  std::vector<PlaceCandidate> query_keyframe(const map::BundledMap& map, KeyframeId keyframe) override;
+  std::vector<PlaceCandidate> query_frame(const map::BundledMap& map, const frame::BundledFrame& frame) override;
   std::size_t memory_bytes() const override;
 
  private:
@@ -58,8 +58,8 @@ class BagOfWordsRecogniser : public PlaceRecogniser {
     double min_common_word_ratio, min_group_score_ratio;  // as in RecognitionOptions
     double min_score = 0;                                 // minimum score of a single keyframe
   };
-  std::vector<Candidate> rank(const map::BundledMap& map, const place::WordVector& words,
-                              const std::vector<std::uint8_t>& excluded, const Bounds& bounds) const;
+  std::vector<PlaceCandidate> rank(const map::BundledMap& map, const place::WordVector& words,
+                                   const std::vector<std::uint8_t>& excluded, const Bounds& bounds) const;
 
   const place::VocabularyPtr vocabulary_;
   const RecognitionOptions options_;

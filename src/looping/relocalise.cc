@@ -8,7 +8,7 @@ std::optional<PlaceMatch> relocalise(PlaceRecogniser& recogniser, const map::Bun
                                      const feature::FeatureModel& features, Random random) {
   std::vector<PlaceMatch> found;
   const camera::Rig rig = frame::rig_of(map.rig(), frame);
-  for (const Candidate& candidate : recogniser.query_frame(map, frame)) {
+  for (const PlaceCandidate& candidate : recogniser.query_frame(map, frame)) {
     if (auto place_match = verify_place(map, rig, frame, candidate.keyframe, options, features, random))
       found.push_back(std::move(*place_match));
   }

@@ -102,10 +102,10 @@ std::optional<Vector3d> new_point(const map::BundledMap& map, View a, const matc
   return estimated->point;
 }
 
-int create_between(View a, View b, double depth, const CreationOptions& options, const FeatureModel& features,
-                   map::MapDraft& draft) {
+void create_between(View a, View b, double depth, const CreationOptions& options, const FeatureModel& features,
+                    map::MapDraft& draft) {
   const map::BundledMap& map = draft.map();
-  if (baseline(map, a, b) < options.min_baseline_over_depth * depth || !shares_view(map, a, b, depth)) return 0;
+  if (baseline(map, a, b) < options.min_baseline_over_depth * depth || !shares_view(map, a, b, depth)) return;
   const std::vector<std::uint8_t> free_a = free_keypoints(map.keyframe(a.keyframe), a.camera);
   const std::vector<std::uint8_t> free_b = free_keypoints(map.keyframe(b.keyframe), b.camera);
   const auto view = [&](View v, std::span<const std::uint8_t> free) {
@@ -122,7 +122,6 @@ int create_between(View a, View b, double depth, const CreationOptions& options,
                                          .max_hamming = options.max_hamming,
                                          .ratio = options.ratio,
                                          .max_level_difference = 3};
-  int made = 0;
   for (const matching::EpipolarMatch& m : matching::match_epipolar(view_a, view_b, search)) {
     const FeatureId fa = draft.map().keyframe(a.keyframe).frame->bundled.feature(a.camera, m.a);
     const FeatureId fb = draft.map().keyframe(b.keyframe).frame->bundled.feature(b.camera, m.b);
@@ -133,29 +132,25 @@ int create_between(View a, View b, double depth, const CreationOptions& options,
     std::vector<map::Observation> observations = {{b.keyframe, fb, false}, {a.keyframe, fa, true}};
     std::sort(observations.begin(), observations.end());
     draft.add_landmark(*point, std::move(observations), {a.keyframe, {a.camera, m.a}});
-    ++made;
   }
-  return made;
 }
 
 }  // namespace
 
-int create_landmarks(KeyframeId keyframe, const CreationOptions& options, const FeatureModel& features,
-                     map::MapDraft& draft) {
+void create_landmarks(KeyframeId keyframe, const CreationOptions& options, const FeatureModel& features,
+                      map::MapDraft& draft) {
   const double depth = map::median_depth(draft.map(), keyframe);
-  if (depth <= 0) return 0;
-  int made = 0;
+  if (depth <= 0) return;
   for (const map::Covisible& neighbour :
        draft.map().best_covisible(keyframe, static_cast<std::size_t>(options.neighbours))) {
     if (longest_way(draft.map(), keyframe, neighbour.keyframe) < options.min_baseline_over_depth * depth) continue;
     for (std::size_t i = 0; i < draft.map().rig().size(); ++i) {
       for (std::size_t j = 0; j < draft.map().rig().size(); ++j) {
-        made += create_between({keyframe, CameraIndex(i)}, {neighbour.keyframe, CameraIndex(j)}, depth, options,
-                               features, draft);
+        create_between({keyframe, CameraIndex(i)}, {neighbour.keyframe, CameraIndex(j)}, depth, options, features,
+                       draft);
       }
     }
   }
-  return made;
 }
 
 }  // namespace bslam::mapping

@@ -7,8 +7,7 @@
 
 namespace bslam::mapping {
 
-// Returns the number of landmarks added to the draft.
-int create_landmarks(KeyframeId keyframe, const CreationOptions& options, const FeatureModel& features,
-                     map::MapDraft& draft);
+void create_landmarks(KeyframeId keyframe, const CreationOptions& options, const FeatureModel& features,
+                      map::MapDraft& draft);
 
 }  // namespace bslam::mapping

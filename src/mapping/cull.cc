@@ -51,7 +51,7 @@ bool redundant(const map::BundledMap& map, KeyframeId k, const CullingOptions& o
 
 }  // namespace
 
-int cull_landmarks(KeyframeId newest, const CullingOptions& options, map::MapDraft& draft) {
+void cull_landmarks(KeyframeId newest, const CullingOptions& options, map::MapDraft& draft) {
   const map::BundledMap& map = draft.map();
   // Landmark ids are in order of creation, so the recent landmarks are at the end.
   std::vector<LandmarkId> bad;
@@ -66,20 +66,15 @@ int cull_landmarks(KeyframeId newest, const CullingOptions& options, map::MapDra
     if (rarely_matched || few_keypoints) bad.push_back(id);
   }
   for (const LandmarkId l : bad) draft.remove_landmark(l);
-  return static_cast<int>(bad.size());
 }
 
-int cull_keyframes(KeyframeId newest, const CullingOptions& options, map::MapDraft& draft) {
-  int culled = 0;
+void cull_keyframes(KeyframeId newest, const CullingOptions& options, map::MapDraft& draft) {
   const std::vector<map::Covisible> neighbours = draft.map().keyframe(newest).covisible;
   for (const map::Covisible& c : neighbours) {
     const bool root = !draft.map().keyframe(c.keyframe).parent.valid();
     if (root || c.keyframe.value() >= newest.value() - 2 || !draft.map().alive(c.keyframe)) continue;
-    if (!redundant(draft.map(), c.keyframe, options)) continue;
-    draft.remove_keyframe(c.keyframe);
-    ++culled;
+    if (redundant(draft.map(), c.keyframe, options)) draft.remove_keyframe(c.keyframe);
   }
-  return culled;
 }
 
 }  // namespace bslam::mapping

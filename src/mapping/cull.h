@@ -7,12 +7,10 @@
 
 namespace bslam::mapping {
 
-// Checks the landmarks created within the last `probation` keyframes up to `newest`. Returns the number of removed
-// landmarks.
-int cull_landmarks(KeyframeId newest, const CullingOptions& options, map::MapDraft& draft);
+// Checks the landmarks created within the last `probation` keyframes up to `newest`.
+void cull_landmarks(KeyframeId newest, const CullingOptions& options, map::MapDraft& draft);
 
 // Checks the keyframes covisible with `newest`; never removes the root or the last two keyframes before `newest`.
-// Returns the number of removed keyframes.
-int cull_keyframes(KeyframeId newest, const CullingOptions& options, map::MapDraft& draft);
+void cull_keyframes(KeyframeId newest, const CullingOptions& options, map::MapDraft& draft);
 
 }  // namespace bslam::mapping

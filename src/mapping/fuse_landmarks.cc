@@ -26,13 +26,11 @@ std::vector<KeyframeId> fusion_targets(const map::BundledMap& map, KeyframeId ke
 
 }  // namespace
 
-FusionReport fuse_landmarks(KeyframeId keyframe, const FusionOptions& options, const FeatureModel& features,
-                            map::MapDraft& draft) {
-  FusionReport report;
+void fuse_landmarks(KeyframeId keyframe, const FusionOptions& options, const FeatureModel& features,
+                    map::MapDraft& draft) {
   const std::vector<KeyframeId> targets = fusion_targets(draft.map(), keyframe, options);
   for (const KeyframeId target : targets) {
-    report +=
-        fuse_into(target, landmarks_of(draft.map(), keyframe), Keep::kMoreObserved, options.search, features, draft);
+    fuse_into(target, landmarks_of(draft.map(), keyframe), Keep::kMoreObserved, options.search, features, draft);
   }
   std::vector<LandmarkId> neighbour_landmarks;
   for (const KeyframeId target : targets) {
@@ -42,9 +40,8 @@ FusionReport fuse_landmarks(KeyframeId keyframe, const FusionOptions& options, c
   std::sort(neighbour_landmarks.begin(), neighbour_landmarks.end());
   neighbour_landmarks.erase(std::unique(neighbour_landmarks.begin(), neighbour_landmarks.end()),
                             neighbour_landmarks.end());
-  report += fuse_into(keyframe, neighbour_landmarks, Keep::kMoreObserved, options.search, features, draft);
+  fuse_into(keyframe, neighbour_landmarks, Keep::kMoreObserved, options.search, features, draft);
   draft.refresh_landmarks(landmarks_of(draft.map(), keyframe));
-  return report;
 }
 
 }  // namespace bslam::mapping

@@ -7,7 +7,7 @@
 
 namespace bslam::mapping {
 
-FusionReport fuse_landmarks(KeyframeId keyframe, const FusionOptions& options, const FeatureModel& features,
-                            map::MapDraft& draft);
+void fuse_landmarks(KeyframeId keyframe, const FusionOptions& options, const FeatureModel& features,
+                    map::MapDraft& draft);
 
 }  // namespace bslam::mapping

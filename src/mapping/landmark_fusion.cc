@@ -23,15 +23,14 @@ bool agrees(const map::BundledMap& map, LandmarkId l, const camera::Rig& rig, st
 }
 
 // Adds the feature as an observation of landmark l or, if the feature already has another landmark, merges the two.
-void join(LandmarkId l, KeyframeId target, FeatureId feature, Keep keep, map::MapDraft& draft, FusionReport& report) {
+void join(LandmarkId l, KeyframeId target, FeatureId feature, Keep keep, map::MapDraft& draft) {
   const LandmarkId existing = draft.map().landmark_of(target, feature);
   if (!existing.valid()) {
-    report.added += draft.add_observation(l, {target, feature, false});
+    draft.add_observation(l, {target, feature, false});
   } else if (existing != l) {
     const bool keep_existing =
         keep == Keep::kMoreObserved && draft.map().observations(existing).size() > draft.map().observations(l).size();
     draft.merge_landmarks(keep_existing ? l : existing, keep_existing ? existing : l);
-    ++report.merged;
   }
 }
 
@@ -48,17 +47,14 @@ std::vector<LandmarkId> absent_from(const map::BundledMap& map, KeyframeId targe
 
 }  // namespace
 
-FusionReport fuse_into(KeyframeId target, const std::vector<LandmarkId>& landmarks, Keep keep,
-                       const LandmarkFusionOptions& options, const feature::FeatureModel& features,
-                       map::MapDraft& draft) {
+void fuse_into(KeyframeId target, const std::vector<LandmarkId>& landmarks, Keep keep,
+               const LandmarkFusionOptions& options, const feature::FeatureModel& features, map::MapDraft& draft) {
   const SE3 T_rig_world = draft.map().keyframe(target).T_rig_world;
-  return fuse_into(target, T_rig_world, landmarks, keep, options, features, draft);
+  fuse_into(target, T_rig_world, landmarks, keep, options, features, draft);
 }
 
-FusionReport fuse_into(KeyframeId target, const SE3& T_rig_world, const std::vector<LandmarkId>& landmarks, Keep keep,
-                       const LandmarkFusionOptions& options, const feature::FeatureModel& features,
-                       map::MapDraft& draft) {
-  FusionReport report;
+void fuse_into(KeyframeId target, const SE3& T_rig_world, const std::vector<LandmarkId>& landmarks, Keep keep,
+               const LandmarkFusionOptions& options, const feature::FeatureModel& features, map::MapDraft& draft) {
   const auto frame = draft.map().keyframe(target).frame;  // shared ownership, because edits may copy the keyframe
   const camera::Rig rig = draft.map().rig_of(target);
   const std::vector<LandmarkId> absent = absent_from(draft.map(), target, landmarks);
@@ -75,10 +71,9 @@ FusionReport fuse_into(KeyframeId target, const SE3& T_rig_world, const std::vec
       if (!l.valid()) continue;
       const feature::Keypoints& keypoints = frame->cameras[c].keypoints;
       if (!agrees(draft.map(), l, rig, c, T_cam_world[c], keypoints, m.keypoint.index(), options, features)) continue;
-      join(l, target, frame->bundled.feature(CameraIndex(c), m.keypoint), keep, draft, report);
+      join(l, target, frame->bundled.feature(CameraIndex(c), m.keypoint), keep, draft);
     }
   }
-  return report;
 }
 
 }  // namespace bslam::mapping

@@ -23,28 +23,15 @@ struct LandmarkFusionOptions {
   }
 };
 
-struct FusionReport {
-  int added = 0;   // number of new observations
-  int merged = 0;  // number of landmarks merged into others
-
-  FusionReport& operator+=(const FusionReport& other) {
-    added += other.added;
-    merged += other.merged;
-    return *this;
-  }
-};
-
 // Determines which of two merged landmarks is kept: the one with more observations, or the one searched for.
 enum class Keep { kMoreObserved, kSearched };
 
 // Searches for `landmarks` in every camera of `target`, projected with the rig pose `T_rig_world`. Landmarks that
 // `target` already observes are skipped.
-FusionReport fuse_into(KeyframeId target, const geometry::SE3& T_rig_world, const std::vector<LandmarkId>& landmarks,
-                       Keep keep, const LandmarkFusionOptions& options, const feature::FeatureModel& features,
-                       map::MapDraft& draft);
+void fuse_into(KeyframeId target, const geometry::SE3& T_rig_world, const std::vector<LandmarkId>& landmarks, Keep keep,
+               const LandmarkFusionOptions& options, const feature::FeatureModel& features, map::MapDraft& draft);
 // The same with the pose of `target` in the draft.
-FusionReport fuse_into(KeyframeId target, const std::vector<LandmarkId>& landmarks, Keep keep,
-                       const LandmarkFusionOptions& options, const feature::FeatureModel& features,
-                       map::MapDraft& draft);
+void fuse_into(KeyframeId target, const std::vector<LandmarkId>& landmarks, Keep keep,
+               const LandmarkFusionOptions& options, const feature::FeatureModel& features, map::MapDraft& draft);
 
 }  // namespace bslam::mapping

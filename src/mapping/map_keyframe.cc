@@ -88,8 +88,8 @@ void map_keyframe(KeyframeId keyframe, const MappingOptions& options, const Feat
   cull_keyframes(keyframe, options.culling, draft);
 }
 
-adjustment::AdjustmentReport adjust_globally(const MappingOptions& options, const FeatureModel& features,
-                                             map::MapDraft& draft, std::stop_token stop) {
+bool adjust_globally(const MappingOptions& options, const FeatureModel& features, map::MapDraft& draft,
+                     std::stop_token stop) {
   return adjustment::adjust_map(select_all(draft.map()), options.global, features, draft, stop);
 }
 

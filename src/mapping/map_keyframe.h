@@ -17,8 +17,9 @@ void map_keyframe(KeyframeId keyframe, const MappingOptions& options, const Feat
                   map::MapDraft& draft, std::stop_token stop = {},
                   std::shared_ptr<const Eigen::MatrixXd> rig_prior = {});
 
-// Global bundle adjustment of all keyframes except the roots, and all landmarks.
-adjustment::AdjustmentReport adjust_globally(const MappingOptions& options, const FeatureModel& features,
-                                             map::MapDraft& draft, std::stop_token stop = {});
+// Global bundle adjustment of all keyframes except the roots, and all landmarks. Returns false if nothing was adjusted;
+// see adjustment::adjust_map.
+bool adjust_globally(const MappingOptions& options, const FeatureModel& features, map::MapDraft& draft,
+                     std::stop_token stop = {});
 
 }  // namespace bslam::mapping

@@ -75,17 +75,17 @@ ScaleReport observe_scale(KeyframeId keyframe, const ScaleOptions& options, cons
   const map::BundledMap& map = draft.map();
   if (!due(map, keyframe)) return report;
   const adjustment::Selection selection = select_observers(map, keyframe, options.keyframes);
-  const auto flat = adjustment::build_problem(map, selection, features);
-  const auto found = rig_scale(flat.problem, {.sigma_rotation = geometry::radians(options.sigma_rotation_deg),
-                                              .correlated_observations = options.correlated_observations});
+  const auto selected = adjustment::build_problem(map, selection, features);
+  const auto found = rig_scale(selected.problem, {.sigma_rotation = geometry::radians(options.sigma_rotation_deg),
+                                                  .correlated_observations = options.correlated_observations});
   if (!found) return report;
   if (map.scale() == map::Scale::kMetric) {
-    if (!contradicts(*found, map, flat.keyframes.size(), options)) return report;
+    if (!contradicts(*found, map, selected.keyframes.size(), options)) return report;
     withdraw_scale(found->deviation, draft);
   }
   report.observed = true;
   report.deviation = found->deviation;
-  report.keyframes = static_cast<int>(flat.keyframes.size());
+  report.keyframes = static_cast<int>(selected.keyframes.size());
   if (found->deviation > options.max_correcting_deviation) return report;
   const double correction = std::clamp(found->scale, 1.0 / kMaxScaleStep, kMaxScaleStep);
   // every scaling is a map correction, which invalidates the work of other stages

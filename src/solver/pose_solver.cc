@@ -45,7 +45,6 @@ PoseSolution report(PoseProblem& problem, const SE3& T_rig_world, const PoseSolv
   out.T_rig_world = T_rig_world;
   out.information = 0.5 * (equations.H + equations.H.transpose());
   out.num_inliers = problem.num_in_use();
-  out.mean_chi2 = out.num_inliers > 0 ? 2.0 * equations.cost / out.num_inliers : 0.0;
   out.inlier.assign(problem.items().size(), 0);
   out.inliers_per_camera.assign(problem.rig().size(), 0);
   for (const PoseProblem::Item& item : problem.items()) {

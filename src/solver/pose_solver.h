@@ -55,7 +55,6 @@ struct PoseSolution {
   int num_inliers = 0;
   std::vector<int> inliers_per_camera;
   geometry::Matrix6d information = geometry::Matrix6d::Zero();  // information of the left perturbation
-  double mean_chi2 = 0.0;                                       // mean squared normalised error of the inliers
 };
 
 // Rounds with Huber kernel, each after a reclassification of all observations by chi-square (95 %, two degrees of

@@ -47,11 +47,12 @@ class SharedPlaces final : public looping::PlaceRecogniser {
       : recogniser_(std::move(vocabulary), options) {}
 
   void describe(frame::BundledFrame& frame) const override { recogniser_.describe(frame); }
-  std::vector<looping::Candidate> query_keyframe(const map::BundledMap& map, KeyframeId keyframe) override {
+  std::vector<looping::PlaceCandidate> query_keyframe(const map::BundledMap& map, KeyframeId keyframe) override {
     const std::lock_guard lock(mutex_);
     return recogniser_.query_keyframe(map, keyframe);
   }
-  std::vector<looping::Candidate> query_frame(const map::BundledMap& map, const frame::BundledFrame& frame) override {
+  std::vector<looping::PlaceCandidate> query_frame(const map::BundledMap& map,
+                                                   const frame::BundledFrame& frame) override {
     const std::lock_guard lock(mutex_);
     return recogniser_.query_frame(map, frame);
   }
@@ -68,10 +69,11 @@ class PlacesOfThread final : public looping::PlaceRecogniser {
   explicit PlacesOfThread(std::shared_ptr<looping::PlaceRecogniser> places) : places_(std::move(places)) {}
 
   void describe(frame::BundledFrame& frame) const override { places_->describe(frame); }
-  std::vector<looping::Candidate> query_keyframe(const map::BundledMap& map, KeyframeId keyframe) override {
+  std::vector<looping::PlaceCandidate> query_keyframe(const map::BundledMap& map, KeyframeId keyframe) override {
     return places_->query_keyframe(map, keyframe);
   }
-  std::vector<looping::Candidate> query_frame(const map::BundledMap& map, const frame::BundledFrame& frame) override {
+  std::vector<looping::PlaceCandidate> query_frame(const map::BundledMap& map,
+                                                   const frame::BundledFrame& frame) override {
     return places_->query_frame(map, frame);
   }
 

@@ -188,7 +188,7 @@ void System::finish() {
     map::MapDraft draft(gate_.newest());
     const auto stop = interruption_.get_token();
     draft.set_twists(twists_from_neighbours(draft.map(), first_keyframe_, frames_));
-    final_adjustment_ = mapping::adjust_globally(config_.mapping, config_.feature_model(), draft, stop);
+    mapping::adjust_globally(config_.mapping, config_.feature_model(), draft, stop);
     final_adjustment_ms_ = watch.ms();
     calibrate(draft, stop);
     if (!stop.stop_requested()) executor_->commit(execution::JournalStep::kFinal, std::move(draft));
@@ -225,9 +225,7 @@ void System::calibrate(map::MapDraft& draft, const std::stop_token& stop) {
     const bool accepted = calibration::accepted(estimate, options);
     if (i == 0 || accepted) calibration_ = std::move(estimate);
     if (!accepted) break;
-    const CalibrationUse use = use_calibration(calibration_, config_, draft, stop);
-    final_adjustment_ = use.adjustment;
-    again = use.new_moves;
+    again = use_calibration(calibration_, config_, draft, stop);
   }
   calibration_.poses = {};                                   // part of the map now
   if (!draft.map().rig().same_calibration(*initial_rig_)) {  // a calibration during the run moves the roots

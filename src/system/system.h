@@ -9,7 +9,6 @@
 #include <utility>
 #include <vector>
 
-#include "adjustment/map_adjustment.h"
 #include "base/result.h"
 #include "camera/rig.h"
 #include "evaluation/trajectory.h"
@@ -105,7 +104,6 @@ class System {
   // The journal for a replay; empty if the history is bounded.
   execution::Journal journal() const { return gate_.journal(); }
   double final_adjustment_ms() const { return final_adjustment_ms_; }
-  const adjustment::AdjustmentReport& final_adjustment() const { return final_adjustment_; }
   // The estimate of the calibration by finish(); not `done` if it was not configured or not possible.
   const calibration::RigRefinement& calibration() const { return calibration_; }
   bool calibration_refined() const { return calibration_refined_; }  // true if the run replaced the rig of the map
@@ -158,7 +156,6 @@ class System {
   std::map<FrameId, TimeNs> deferred_time_ns_;      // frames from which keyframes are being created
   std::vector<tracking::CreatedKeyframe> created_;  // keyframes whose frame records are not marked yet
   double final_adjustment_ms_ = 0, calibration_ms_ = 0;
-  adjustment::AdjustmentReport final_adjustment_;
   calibration::RigRefinement calibration_;
   bool calibration_refined_ = false;
   int maps_started_ = 0;

@@ -33,24 +33,20 @@ std::vector<double> calibration_errors(std::span<const double> before, const map
     for (double& error : kept) error = std::max(error, options.calibration_error_px);
     return kept;
   }
-  const camera::Rig rig = frame::rig_of(map.rig(), frame);
   std::vector<double> errors(before.begin(), before.end());
-  errors.resize(rig.size(), options.calibration_error_px);
+  errors.resize(map.rig().size(), options.calibration_error_px);
+  const auto of_matches = squared_errors(map, frame, output.result.T_rig_world, output.matches);
   for (std::size_t c = 0; c < output.matches.size(); ++c) {
-    const geometry::SE3 T_cam_world = rig.cam_from_rig(c) * output.result.T_rig_world;
     const feature::Keypoints& keypoints = frame.cameras[c].keypoints;
-    std::vector<double> squared_errors, variances;
-    for (const Match& m : output.matches[c]) {
-      const std::size_t k = m.keypoint.index();
-      const Eigen::Vector3d point_cam = rig.shutter(c).at_row(T_cam_world * map.landmark(m.landmark).position,
-                                                              static_cast<double>(keypoints.pixel[k].y()));
-      const auto projected = rig.camera(c).project(point_cam);
-      if (!projected) continue;
-      squared_errors.push_back((keypoints.pixel[k].cast<double>() - *projected).squaredNorm());
-      const double variance = static_cast<double>(keypoints.sigma[k]) * keypoints.sigma[k];
-      variances.push_back(m.aligned ? variance - errors[c] * errors[c] : variance);
+    std::vector<double> known_errors, variances;
+    for (std::size_t i = 0; i < output.matches[c].size(); ++i) {
+      if (!of_matches[c][i]) continue;
+      const Match& m = output.matches[c][i];
+      const double sigma = static_cast<double>(keypoints.sigma[m.keypoint.index()]);
+      known_errors.push_back(*of_matches[c][i]);
+      variances.push_back(m.aligned ? sigma * sigma - errors[c] * errors[c] : sigma * sigma);
     }
-    errors[c] = update_calibration_error(errors[c], std::move(squared_errors), std::move(variances), options);
+    errors[c] = update_calibration_error(errors[c], std::move(known_errors), std::move(variances), options);
   }
   return errors;
 }

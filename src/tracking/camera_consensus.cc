@@ -131,8 +131,8 @@ solver::PoseSolution pose_of_most_consistent_camera(const camera::Rig& rig, cons
                                                     const solver::PoseSolution& of_all, const SE3& predicted,
                                                     const ConsensusOptions& options,
                                                     const solver::PoseSolverOptions& pose) {
-  constexpr double kRadiansPerMetre = 1.0;  // weight of a translation relative to a rotation
-  constexpr double kMaxChi2 = 25.0;         // squared normalised error of observations that agree with such a pose
+  constexpr double kRadiansPerMetre = 1.0;   // weight of a translation relative to a rotation
+  constexpr double kMaxAgreeingChi2 = 25.0;  // squared normalised error of observations that agree with such a pose
   const auto healthy = [&](int inliers, std::size_t found) {
     return inliers >= options.healthy_reobservation_ratio * static_cast<double>(found);
   };
@@ -143,7 +143,7 @@ solver::PoseSolution pose_of_most_consistent_camera(const camera::Rig& rig, cons
     const geometry::Vector6d difference = (T_rig_world * predicted.inverse()).log();
     const double distance = difference.head<3>().norm() + kRadiansPerMetre * difference.tail<3>().norm();
     solver::PoseSolverOptions near = pose;
-    near.first_chi2 = kMaxChi2;
+    near.first_chi2 = kMaxAgreeingChi2;
     solver::PoseSolution joint = solver::solve_pose(rig, observations, T_rig_world, near);
     if (!joint.ok) return;
     contradiction = contradiction && !agreed_by_all(joint, matches, options);

@@ -170,6 +170,24 @@ std::vector<solver::PoseObservation> pose_observations(const map::BundledMap& ma
   return out;
 }
 
+std::vector<std::vector<std::optional<double>>> squared_errors(const map::BundledMap& map,
+                                                               const frame::BundledFrame& frame,
+                                                               const geometry::SE3& T_rig_world,
+                                                               const FrameMatches& matches) {
+  const camera::Rig rig = frame::rig_of(map.rig(), frame);
+  std::vector<std::vector<std::optional<double>>> out(matches.size());
+  for (std::size_t c = 0; c < matches.size(); ++c) {
+    const geometry::SE3 T_cam_world = rig.cam_from_rig(c) * T_rig_world;
+    for (const Match& m : matches[c]) {
+      const Eigen::Vector2d pixel = frame.cameras[c].keypoints.pixel[m.keypoint.index()].cast<double>();
+      const Eigen::Vector3d point = T_cam_world * map.landmark(m.landmark).position;
+      const auto projected = rig.camera(c).project(rig.shutter(c).at_row(point, pixel.y()));
+      out[c].push_back(projected ? std::optional((pixel - *projected).squaredNorm()) : std::nullopt);
+    }
+  }
+  return out;
+}
+
 FrameMatches keep_inliers(const FrameMatches& matches, std::span<const std::uint8_t> inlier) {
   FrameMatches out(matches.size());
   std::size_t i = 0;

@@ -86,6 +86,13 @@ std::vector<solver::PoseObservation> pose_observations(const map::BundledMap& ma
                                                        const FrameMatches& matches,
                                                        const feature::FeatureModel& features);
 
+// The squared reprojection errors of the matches in the frame's images, px^2; per camera, in the order of the matches.
+// nullopt: the landmark is behind the camera.
+std::vector<std::vector<std::optional<double>>> squared_errors(const map::BundledMap& map,
+                                                               const frame::BundledFrame& frame,
+                                                               const geometry::SE3& T_rig_world,
+                                                               const FrameMatches& matches);
+
 // The matches whose observation is an inlier.
 FrameMatches keep_inliers(const FrameMatches& matches, std::span<const std::uint8_t> inlier);
 

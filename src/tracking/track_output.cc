@@ -22,15 +22,9 @@ std::vector<CameraCounts> camera_counts(const frame::BundledFrame& frame, const 
 // Adds the reprojection errors of the inliers. Landmarks behind a camera are not counted.
 void add_errors(const map::BundledMap& map, const frame::BundledFrame& frame, const geometry::SE3& T_rig_world,
                 const FrameMatches& inliers, std::vector<CameraCounts>& counts) {
-  const camera::Rig rig = frame::rig_of(map.rig(), frame);
-  for (std::size_t c = 0; c < inliers.size(); ++c) {
-    const geometry::SE3 T_cam_world = rig.cam_from_rig(c) * T_rig_world;
-    for (const Match& m : inliers[c]) {
-      const Eigen::Vector2d pixel = frame.cameras[c].keypoints.pixel[m.keypoint.index()].cast<double>();
-      const Eigen::Vector3d point = T_cam_world * map.landmark(m.landmark).position;
-      const auto projected = rig.camera(c).project(rig.shutter(c).at_row(point, pixel.y()));
-      if (projected) counts[c].squared_error_px2 += (pixel - *projected).squaredNorm();
-    }
+  const auto errors = squared_errors(map, frame, T_rig_world, inliers);
+  for (std::size_t c = 0; c < errors.size(); ++c) {
+    for (const std::optional<double> error : errors[c]) counts[c].squared_error_px2 += error.value_or(0.0);
   }
 }
 

@@ -28,10 +28,10 @@ std::vector<float> sigmas_of_one_landmark(map::BundledMap& map, const std::vecto
   const map::Observation& r = observations[reference];
   const frame::KeypointRef keypoint = map.keyframe(r.keyframe).frame->bundled.keypoints(r.feature).front();
   const LandmarkId l = map.add_landmark({0, 0, 5}, observations, {r.keyframe, keypoint});
-  const BundleProblem flat = build_problem(
+  const BundleProblem selected = build_problem(
       map, {.free_keyframes = map.keyframe_ids(), .fixed_keyframes = {}, .landmarks = {l}}, {kDetected, {}});
   std::vector<float> out;
-  for (const auto& o : flat.problem.observations) out.push_back(o.sigma);
+  for (const auto& o : selected.problem.observations) out.push_back(o.sigma);
   return out;
 }
 

@@ -37,7 +37,7 @@ Selection window(const map::BundledMap& map, int newest, int free, int fixed) {
 
 void adjust(const Selection& selection, const AdjustmentOptions& options, map::BundledMap& map) {
   map::MapDraft draft(std::make_shared<const map::BundledMap>(map));
-  ASSERT_TRUE(adjust_map(selection, options, kFeatures, draft).done);
+  ASSERT_TRUE(adjust_map(selection, options, kFeatures, draft));
   map = std::move(draft).finish().result;
 }
 

@@ -14,7 +14,7 @@ inline BundledMap adjusted(SimulatedMap& world, const feature::FeatureModel& fea
     (k.value() == 0 ? all.fixed_keyframes : all.free_keyframes).push_back(k);
   all.landmarks = world.map.landmark_ids();
   MapDraft draft = world.draft();
-  EXPECT_TRUE(adjustment::adjust_map(all, {}, features, draft).done);
+  EXPECT_TRUE(adjustment::adjust_map(all, {}, features, draft));
   return draft.map();
 }
 

@@ -41,29 +41,29 @@ TEST(RecoverObservations, RecoversRejectedKeypointsWithFewErrors) {
     ASSERT_TRUE(world.map.remove_observation(l, last));
   }
   ASSERT_GT(rejected, 60u);
-  adjustment::BundleProblem flat = everything(world.map);
-  const auto before = flat.problem.observations;
-  const int added = recover_observations(world.map, world.map.rig(), kFeatures, flat);
+  adjustment::BundleProblem selected = everything(world.map);
+  const auto before = selected.problem.observations;
+  const int added = recover_observations(world.map, world.map.rig(), kFeatures, selected);
   EXPECT_GT(added, 0.8 * static_cast<double>(rejected));
-  ASSERT_EQ(flat.problem.observations.size(), before.size() + static_cast<std::size_t>(added));
-  ASSERT_EQ(flat.sources.size(), flat.problem.observations.size());
+  ASSERT_EQ(selected.problem.observations.size(), before.size() + static_cast<std::size_t>(added));
+  ASSERT_EQ(selected.sources.size(), selected.problem.observations.size());
   int right = 0, new_ones = 0;
-  for (std::size_t i = 0, old = 0; i < flat.problem.observations.size(); ++i) {
-    const auto& o = flat.problem.observations[i];
+  for (std::size_t i = 0, old = 0; i < selected.problem.observations.size(); ++i) {
+    const auto& o = selected.problem.observations[i];
     if (i > 0) {  // sorted, and no point is observed twice in an image
-      const auto& p = flat.problem.observations[i - 1];
+      const auto& p = selected.problem.observations[i - 1];
       EXPECT_LT(std::tuple(p.point, p.pose, p.camera), std::tuple(o.point, o.pose, o.camera));
     }
-    const LandmarkId l = flat.landmarks[static_cast<std::size_t>(o.point)];
-    EXPECT_EQ(flat.sources[i].landmark, l);
-    EXPECT_EQ(flat.sources[i].keyframe, flat.keyframes[static_cast<std::size_t>(o.pose)]);
+    const LandmarkId l = selected.landmarks[static_cast<std::size_t>(o.point)];
+    EXPECT_EQ(selected.sources[i].landmark, l);
+    EXPECT_EQ(selected.sources[i].keyframe, selected.keyframes[static_cast<std::size_t>(o.pose)]);
     if (old < before.size() && before[old].pose == o.pose && before[old].point == o.point &&
         before[old].camera == o.camera) {
       ++old;
       continue;
     }
     ++new_ones;
-    const map::SimulatedFrame& frame = world.frames[flat.sources[i].keyframe.index()];
+    const map::SimulatedFrame& frame = world.frames[selected.sources[i].keyframe.index()];
     const auto& pixels = frame.frame.keypoints(o.camera).pixel;
     const auto k = static_cast<std::size_t>(std::find(pixels.begin(), pixels.end(), o.pixel) - pixels.begin());
     right += frame.landmark[o.camera.index()][k] == world.truth_of_landmark.at(l.value());
@@ -93,19 +93,19 @@ TEST(RecoverObservations, UsesTheGivenExtrinsics) {
 
 TEST(RecoverObservations, UsesNoKeypointWithALandmark) {
   const map::SimulatedMap world = true_map();
-  adjustment::BundleProblem flat = everything(world.map);
-  const std::size_t before = flat.problem.observations.size();
-  recover_observations(world.map, world.map.rig(), kFeatures, flat);
-  for (std::size_t i = 0; i < flat.problem.observations.size(); ++i) {
-    const auto& o = flat.problem.observations[i];
-    const KeyframeId k = flat.sources[i].keyframe;
+  adjustment::BundleProblem selected = everything(world.map);
+  const std::size_t before = selected.problem.observations.size();
+  recover_observations(world.map, world.map.rig(), kFeatures, selected);
+  for (std::size_t i = 0; i < selected.problem.observations.size(); ++i) {
+    const auto& o = selected.problem.observations[i];
+    const KeyframeId k = selected.sources[i].keyframe;
     const auto& pixels = world.map.keypoints(k, o.camera).pixel;
     const auto at = static_cast<std::size_t>(std::find(pixels.begin(), pixels.end(), o.pixel) - pixels.begin());
     const LandmarkId there =
         world.map.landmark_of(k, world.map.keyframe(k).frame->bundled.feature(o.camera, KeypointIndex(at)));
-    EXPECT_TRUE(!there.valid() || there == flat.sources[i].landmark);
+    EXPECT_TRUE(!there.valid() || there == selected.sources[i].landmark);
   }
-  EXPECT_LT(flat.problem.observations.size(), before + before / 20);
+  EXPECT_LT(selected.problem.observations.size(), before + before / 20);
 }
 
 TEST(RecoverObservations, UsesNoKeypointOfAnotherPointOfTheProblem) {
@@ -116,7 +116,7 @@ TEST(RecoverObservations, UsesNoKeypointOfAnotherPointOfTheProblem) {
     }
   }
   const adjustment::BundleProblem before = everything(world.map);
-  adjustment::BundleProblem once = before, flat = before;
+  adjustment::BundleProblem once = before, selected = before;
   ASSERT_GT(recover_observations(world.map, world.map.rig(), kFeatures, once), 0);
   const auto known = [&](const auto& o) {
     return std::ranges::any_of(before.problem.observations, [&](const auto& b) {
@@ -125,11 +125,11 @@ TEST(RecoverObservations, UsesNoKeypointOfAnotherPointOfTheProblem) {
   };
   auto given = *std::ranges::find_if_not(once.problem.observations, known);  // a keypoint that would be found
   const int rightful = std::exchange(given.point, given.point == 0 ? 1 : 0);
-  flat.problem.observations.push_back(given);
-  flat.sources.push_back(
-      {flat.landmarks[static_cast<std::size_t>(given.point)], flat.keyframes[static_cast<std::size_t>(given.pose)]});
-  recover_observations(world.map, world.map.rig(), kFeatures, flat);
-  for (const auto& o : flat.problem.observations) {
+  selected.problem.observations.push_back(given);
+  selected.sources.push_back({selected.landmarks[static_cast<std::size_t>(given.point)],
+                              selected.keyframes[static_cast<std::size_t>(given.pose)]});
+  recover_observations(world.map, world.map.rig(), kFeatures, selected);
+  for (const auto& o : selected.problem.observations) {
     EXPECT_FALSE(o.point == rightful && o.pose == given.pose && o.camera == given.camera && o.pixel == given.pixel);
   }
 }

@@ -206,24 +206,24 @@ TEST(MovedCameras, SeparateAndJoinAreInverse) {
   const solver::RigValues values = cameras.added_to(solver::RigValues::of(map.rig()));
   const camera::Rig rig = cameras.added_to(map.rig());
   RigProblem problem = choose(map, false, kIndependent, kFeatures);
-  const std::vector<solver::ReprojectionProblem::Observation> original = problem.flat.problem.observations;
+  const std::vector<solver::ReprojectionProblem::Observation> original = problem.selected.problem.observations;
   cameras.separate(map, problem);
-  problem.flat.problem.rig = &rig;
+  problem.selected.problem.rig = &rig;
   const auto errors = [&](const solver::RigValues& of_rig) {
-    const solver::ReprojectionProblem& flat = problem.flat.problem;
-    std::vector<double> out = solver::squared_errors(flat, flat.T_rig_world, flat.points, of_rig);
+    const solver::ReprojectionProblem& bundle = problem.selected.problem;
+    std::vector<double> out = solver::squared_errors(bundle, bundle.T_rig_world, bundle.points, of_rig);
     std::ranges::sort(out);
     return out;
   };
   const std::vector<double> separate = errors(values);
   cameras.join(map, values, problem);
-  problem.flat.problem.rig = &map.rig();
+  problem.selected.problem.rig = &map.rig();
   const std::vector<double> joined = errors(cameras.of_rig(values));
   ASSERT_EQ(joined.size(), separate.size());
   for (std::size_t i = 0; i < joined.size(); ++i) EXPECT_NEAR(joined[i], separate[i], 1e-6 * (1 + separate[i]));
-  ASSERT_EQ(problem.flat.problem.observations.size(), original.size());
+  ASSERT_EQ(problem.selected.problem.observations.size(), original.size());
   for (std::size_t i = 0; i < original.size(); ++i)
-    EXPECT_EQ(problem.flat.problem.observations[i].camera, original[i].camera);
+    EXPECT_EQ(problem.selected.problem.observations[i].camera, original[i].camera);
 }
 
 // The information about the cameras of the rig is the inverse of their part of the covariance.

@@ -20,7 +20,7 @@ TEST(PathDeviation, IsTheDerivativeOfThePathLengthByTheErrorOfTheCalibration) {
   Random random(1);
   RigProblem problem;
   problem.group = {0, 0, 0, 1, 1, 1};
-  auto& poses = problem.flat.problem.T_rig_world;
+  auto& poses = problem.selected.problem.T_rig_world;
   std::vector<Effect> effects;
   for (std::size_t i = 0; i < problem.group.size(); ++i) {
     poses.push_back(geometry::SE3::exp(random_vector(random)));
@@ -32,8 +32,8 @@ TEST(PathDeviation, IsTheDerivativeOfThePathLengthByTheErrorOfTheCalibration) {
   for (int k = 0; k < kErrors; ++k) {
     RigProblem plus = problem, minus = problem;
     for (std::size_t i = 0; i < poses.size(); ++i) {
-      plus.flat.problem.T_rig_world[i] = poses[i].perturbed(kStep * effects[i].col(k));
-      minus.flat.problem.T_rig_world[i] = poses[i].perturbed(-kStep * effects[i].col(k));
+      plus.selected.problem.T_rig_world[i] = poses[i].perturbed(kStep * effects[i].col(k));
+      minus.selected.problem.T_rig_world[i] = poses[i].perturbed(-kStep * effects[i].col(k));
     }
     const double derivative = (path_length(plus) - path_length(minus)) / (2 * kStep);
     squares += derivative * derivative;

@@ -51,22 +51,22 @@ TEST(RigFrame, MovingAProblemKeepsPixelsAndFixedPoses) {
   for (int i = 0; i < 4; ++i) {
     Eigen::Matrix<double, 6, 1> xi;
     xi << 0.1 * i, -0.05, 0.02 * i, 0.5 * i, 0.1, -0.2;
-    problem.flat.problem.T_rig_world.push_back(SE3::exp(xi));
+    problem.selected.problem.T_rig_world.push_back(SE3::exp(xi));
     const Eigen::Vector3d point =
-        problem.flat.problem.T_rig_world.back().inverse() * Eigen::Vector3d(0.3, 0.2, 4.0 + i);
-    problem.flat.problem.points.push_back(point);
-    problem.flat.problem.observations.push_back(
+        problem.selected.problem.T_rig_world.back().inverse() * Eigen::Vector3d(0.3, 0.2, 4.0 + i);
+    problem.selected.problem.points.push_back(point);
+    problem.selected.problem.observations.push_back(
         {.pose = i, .point = i, .camera = CameraIndex(std::size_t{0}), .pixel = Eigen::Vector2f::Zero(), .sigma = 1});
   }
   RigProblem moved = problem;
   move_to_rig_frame(after, before, moved);
   for (std::size_t i = 0; i < 4; ++i) {
-    const Eigen::Vector3d in_cam0 = after * (moved.flat.problem.T_rig_world[i] * moved.flat.problem.points[i]);
+    const Eigen::Vector3d in_cam0 = after * (moved.selected.problem.T_rig_world[i] * moved.selected.problem.points[i]);
     EXPECT_TRUE(in_cam0.isApprox(Eigen::Vector3d(0.3, 0.2, 4.0 + static_cast<double>(i)), 1e-9)) << i;
   }
   for (const std::size_t fixed : {0u, 2u}) {  // as in the map
-    const SE3 in_map = before.inverse() * problem.flat.problem.T_rig_world[fixed];
-    EXPECT_TRUE(moved.flat.problem.T_rig_world[fixed].matrix().isApprox(in_map.matrix(), 1e-9)) << fixed;
+    const SE3 in_map = before.inverse() * problem.selected.problem.T_rig_world[fixed];
+    EXPECT_TRUE(moved.selected.problem.T_rig_world[fixed].matrix().isApprox(in_map.matrix(), 1e-9)) << fixed;
   }
 }
 

@@ -57,7 +57,7 @@ TEST(PairRotation, PointsBehindTheCamerasDoNotAgree) {
 
 TEST(PairRotation, RemainsAsGivenWithoutMatches) {
   const PairRotation found = pair_rotation({}, {}, {});
-  EXPECT_EQ(found.angle, 0);
+  EXPECT_EQ(found.correction, Eigen::Matrix3d::Identity());
   EXPECT_EQ(found.agree, 0);
 }
 

@@ -16,10 +16,10 @@ class Consistency : public ::testing::Test {
   }
   // Returns the consistent candidates of a keyframe.
   std::vector<KeyframeId> consistent(int keyframe, const std::vector<int>& candidates) {
-    std::vector<Candidate> list;
+    std::vector<PlaceCandidate> list;
     for (const int c : candidates) list.push_back({KeyframeId(c), 1.0});
     std::vector<KeyframeId> out;
-    for (const Candidate& c : consistent_candidates(map_, KeyframeId(keyframe), list, options, history_))
+    for (const PlaceCandidate& c : consistent_candidates(map_, KeyframeId(keyframe), list, options, history_))
       out.push_back(c.keyframe);
     return out;
   }

@@ -10,7 +10,7 @@ namespace {
 // Accepts every keyframe that shares a word.
 const RecognitionOptions kLoose{.min_common_word_ratio = 0, .min_group_score_ratio = 0, .max_candidates = 100};
 
-void expect_equal(const std::vector<Candidate>& a, const std::vector<Candidate>& b) {
+void expect_equal(const std::vector<PlaceCandidate>& a, const std::vector<PlaceCandidate>& b) {
   ASSERT_EQ(a.size(), b.size());
   for (std::size_t i = 0; i < a.size(); ++i) {
     EXPECT_EQ(a[i].keyframe, b[i].keyframe);
@@ -23,7 +23,7 @@ class RecogniserRig : public ::testing::TestWithParam<int> {};
 TEST_P(RecogniserRig, RanksTheRevisitedPlaceFirst) {
   const HallMap& world = map_with_drift(GetParam());
   for (const int again : {kLapKeyframes, kLapKeyframes + 1}) {
-    const std::vector<Candidate> candidates = recogniser()->query_keyframe(world.map, KeyframeId(again));
+    const std::vector<PlaceCandidate> candidates = recogniser()->query_keyframe(world.map, KeyframeId(again));
     ASSERT_FALSE(candidates.empty());
     EXPECT_LE(std::abs(candidates.front().keyframe.value() - (again - kLapKeyframes)), 2);
     for (std::size_t i = 1; i < candidates.size(); ++i) EXPECT_LE(candidates[i].score, candidates[i - 1].score);
@@ -44,7 +44,7 @@ TEST_P(RecogniserRig, RanksTheTrueNeighbourhoodOfAFrameFirst) {
   const FeatureSimulator simulator = hall(rig_of(GetParam()));
   for (const int at : {2, 9, 17, 28}) {
     const auto frame = described(simulator.frame(FrameId(1000 + at), kStepS * at + 0.5));
-    const std::vector<Candidate> candidates = recogniser()->query_frame(world.map, frame);
+    const std::vector<PlaceCandidate> candidates = recogniser()->query_frame(world.map, frame);
     ASSERT_FALSE(candidates.empty());
     EXPECT_LE(std::abs(candidates.front().keyframe.value() - at), 2);
   }
@@ -57,7 +57,7 @@ TEST_P(RecogniserRig, NeighboursAreNeverCandidates) {
   for (const KeyframeId k : world.map.keyframe_ids()) {
     const auto& table = world.map.keyframe(k).landmarks.values();
     const auto landmarks = std::ranges::count_if(table, [](LandmarkId l) { return l.valid(); });
-    for (const Candidate& c : loose->query_keyframe(world.map, k)) {
+    for (const PlaceCandidate& c : loose->query_keyframe(world.map, k)) {
       ++candidates;
       EXPECT_NE(c.keyframe, k);
       for (const map::Covisible& n : world.map.keyframe(k).covisible) {
@@ -85,8 +85,8 @@ TEST(BagOfWordsRecogniser, DiscardsPlacesLessSimilarThanTheNeighbours) {
   // Without neighbours there is no such bound: the place becomes a candidate, ranked after the former neighbours.
   const RecognitionOptions unbound{
       .min_common_word_ratio = 0, .min_group_score_ratio = 0, .min_neighbour_landmarks = 10000};
-  const std::vector<Candidate> without = recogniser(unbound)->query_keyframe(world.map, newest);
-  EXPECT_TRUE(std::ranges::any_of(without, [](const Candidate& c) { return c.keyframe.value() < 3; }));
+  const std::vector<PlaceCandidate> without = recogniser(unbound)->query_keyframe(world.map, newest);
+  EXPECT_TRUE(std::ranges::any_of(without, [](const PlaceCandidate& c) { return c.keyframe.value() < 3; }));
 }
 
 // For example two rooms, one of which is partly visible from the other through a door.
@@ -126,13 +126,13 @@ TEST(BagOfWordsRecogniser, DoesNotReturnRemovedKeyframes) {
   const HallMap& world = map_with_drift(1);
   const KeyframeId last(kLapKeyframes + 1);
   const auto places = recogniser(kLoose);
-  const auto found = [&](const std::vector<Candidate>& candidates, KeyframeId k) {
-    return std::ranges::find(candidates, k, &Candidate::keyframe) != candidates.end();
+  const auto found = [&](const std::vector<PlaceCandidate>& candidates, KeyframeId k) {
+    return std::ranges::find(candidates, k, &PlaceCandidate::keyframe) != candidates.end();
   };
   const KeyframeId best = places->query_keyframe(world.map, last).front().keyframe;
   map::MapDraft draft = world.draft();
   if (!draft.remove_keyframe(best)) GTEST_FAIL() << "the best one is the root";
-  const std::vector<Candidate> after = places->query_keyframe(draft.map(), last);
+  const std::vector<PlaceCandidate> after = places->query_keyframe(draft.map(), last);
   EXPECT_FALSE(after.empty());
   EXPECT_FALSE(found(after, best));
 }
@@ -144,7 +144,7 @@ TEST(BagOfWordsRecogniser, HandlesANewMapWithTheSameIds) {
   const auto places = recogniser();
   const auto frame = described(simulator.frame(FrameId(1000), 26.4));
   places->query_frame(map_without_drift(1).map, frame);
-  const std::vector<Candidate> candidates = places->query_frame(fresh.map, frame);
+  const std::vector<PlaceCandidate> candidates = places->query_frame(fresh.map, frame);
   ASSERT_FALSE(candidates.empty());
   EXPECT_LE(std::abs(candidates.front().keyframe.value() - 2), 1);
   expect_equal(candidates, recogniser()->query_frame(fresh.map, frame));

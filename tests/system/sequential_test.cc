@@ -2,6 +2,8 @@
 
 #include <array>
 
+#include "adjustment/robust_cost.h"
+#include "mapping/local_adjustment.h"
 #include "system/rendered_tour.h"
 
 namespace bslam::system {
@@ -345,11 +347,16 @@ TEST(SystemSequential, KeepsTheConfiguredHistory) {
 
 TEST(SystemSequential, FinalAdjustmentDecreasesTheCost) {
   const RenderedTour tour(2, 8);
-  System system(tour.rig(), small_config(execution::Mode::kSequential));
+  Config config = small_config(execution::Mode::kSequential);
+  config.mapping.global.final_iterations = 0;  // the round on the inliers minimises another cost
+  System system(tour.rig(), config);
   for (const image::ImageBundle& images : tour.frames()) must_process(system, images);
+  const map::MapSnapshot before = system.snapshot();
   system.finish();
-  EXPECT_TRUE(system.final_adjustment().done);
-  EXPECT_LT(system.final_adjustment().final_cost, system.final_adjustment().initial_cost);
+  const auto cost = [&](const map::BundledMap& map) {
+    return adjustment::robust_cost(*before, mapping::select_all(*before), config.feature_model(), map);
+  };
+  EXPECT_LT(cost(*system.snapshot()), cost(*before));
 }
 
 TEST(SystemSequential, AdjustsTheWholeMapAtTheEndOnlyIfConfigured) {
