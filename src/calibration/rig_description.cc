@@ -70,7 +70,8 @@ std::string direction_in_words(const geometry::Matrix3d& R_rig_cam) {
   return text;
 }
 
-std::string describe_camera(const camera::Rig& rig, std::size_t i) {
+// `from_camera_0`: the rig in the frame of its camera 0.
+std::string describe_camera(const camera::Rig& rig, const camera::Rig& from_camera_0, std::size_t i) {
   const camera::Camera& camera = rig.camera(i);
   const camera::Intrinsics& k = camera::intrinsics(camera.model);
   const FieldOfView view = field_of_view(camera);
@@ -83,7 +84,7 @@ std::string describe_camera(const camera::Rig& rig, std::size_t i) {
   text += fmt::format("  in the body frame: at {} m, optical axis {}\n", vector_text(T_body_cam.translation()),
                       vector_text(T_body_cam.rotation() * Vector3d::UnitZ()));
   if (i > 0) {
-    const SE3 T_cam0_cam = rig.in_frame_of_camera_0().rig_from_cam(i);
+    const SE3& T_cam0_cam = from_camera_0.rig_from_cam(i);
     text += fmt::format("  from camera 0: {}; {}\n", displacement_in_words(T_cam0_cam.translation()),
                         direction_in_words(T_cam0_cam.matrix3()));
   }
@@ -141,7 +142,8 @@ std::string displacement_in_words(const Vector3d& displacement) {
 
 std::string describe_rig(const camera::Rig& rig) {
   std::string text = fmt::format("{} camera{}\n", rig.size(), rig.size() == 1 ? "" : "s");
-  for (std::size_t i = 0; i < rig.size(); ++i) text += describe_camera(rig, i);
+  const camera::Rig from_camera_0 = rig.in_frame_of_camera_0();
+  for (std::size_t i = 0; i < rig.size(); ++i) text += describe_camera(rig, from_camera_0, i);
   if (rig.size() == 1) return text;
   text += "baselines:\n";
   for (std::size_t i = 0; i < rig.size(); ++i) {

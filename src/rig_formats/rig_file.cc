@@ -298,11 +298,11 @@ std::vector<fs::path> files_in_the_way(RigFormat format, const fs::path& out) {
 }
 
 camera::Rig without(const camera::Rig& rig, Droppable what) {
-  const camera::Rig from_camera_0 = rig.in_frame_of_camera_0();
+  const bool drop_body = what == Droppable::kBodyFrame;
+  const camera::Rig source = drop_body ? rig.in_frame_of_camera_0() : rig;
   std::vector<camera::RigCamera> cameras;
   for (std::size_t i = 0; i < rig.size(); ++i) {
-    const bool own_body = what != Droppable::kBodyFrame;
-    camera::RigCamera c{rig.camera(i), own_body ? rig.body_from_cam(i) : from_camera_0.rig_from_cam(i)};
+    camera::RigCamera c{rig.camera(i), drop_body ? source.rig_from_cam(i) : source.body_from_cam(i)};
     if (what == Droppable::kMasks) c.camera.mask_file.clear();
     if (what == Droppable::kTimeOffsets) c.camera.time_offset_ns = 0;
     if (what == Droppable::kRollingShutters) c.camera.readout_s = 0;

@@ -24,12 +24,13 @@ using Json = nlohmann::ordered_json;
 
 Json vector_json(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
-Json camera_json(const camera::Rig& rig, std::size_t i) {
+// `from_camera_0`: the rig in the frame of its camera 0.
+Json camera_json(const camera::Rig& rig, const camera::Rig& from_camera_0, std::size_t i) {
   const camera::Camera& camera = rig.camera(i);
   const camera::Intrinsics& k = camera::intrinsics(camera.model);
   const calibration::FieldOfView view = calibration::field_of_view(camera);
   const geometry::SE3& T = rig.body_from_cam(i);
-  const geometry::SE3 T_cam0_cam = rig.in_frame_of_camera_0().rig_from_cam(i);
+  const geometry::SE3& T_cam0_cam = from_camera_0.rig_from_cam(i);
   Json overlaps = Json::array();
   for (std::size_t j = 0; j < rig.size(); ++j) overlaps.push_back(i == j ? 1.0 : rig.overlap_share(i, j));
   return {{"name", camera.name},
@@ -124,9 +125,10 @@ struct ImageEvidence {
 std::string as_json(const Calibration& calibration, const std::optional<ImageEvidence>& evidence) {
   const rig_formats::RigFile& file = calibration.file;
   const camera::Rig& rig = file.rig;
+  const camera::Rig from_camera_0 = rig.in_frame_of_camera_0();
   Json cameras = Json::array(), baselines = Json::array();
   for (std::size_t i = 0; i < rig.size(); ++i) {
-    cameras.push_back(camera_json(rig, i));
+    cameras.push_back(camera_json(rig, from_camera_0, i));
     for (std::size_t j = i + 1; j < rig.size(); ++j) {
       const double length = (rig.rig_from_cam(i).translation() - rig.rig_from_cam(j).translation()).norm();
       baselines.push_back({{"cameras", {i, j}}, {"length_m", length}});
