@@ -75,7 +75,6 @@ void ImageGrouper::remove(const ClockWatch::Refuted& refuted, std::vector<Droppe
 // Estimates the delays of the cameras relative to camera 0 from their newest images. New delays are adopted only if
 // they do not put a waiting image before the last complete bundle.
 void ImageGrouper::update_phases() {
-  if (recent_[0].empty()) return;
   image::CapturePhases phases = image::capture_phases(recent_, tolerance_, phases_.cameras);
   if (phases == phases_) return;
   for (std::size_t c = 0; c < cameras_.size(); ++c) {

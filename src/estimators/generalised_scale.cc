@@ -22,17 +22,17 @@ constexpr double kMinCondition = 1e-12;  // minimum condition of the normal equa
 // pairs carry as much information as one.
 constexpr double kExcludingSigmas = 3.0, kCorrelatedPairs = 10.0;
 
-// `cost`: half the sum of squared angles, each at most the square of the knee.
+// `cost`: half the sum of squared angles, each at most the square of the camera's `inlier_angle`.
 struct Sums : solver::NormalEquations<6> {
   double squared = 0.0;  // sum of squared angles of the inliers
   int inliers = 0;
 };
 
-// Squared Sampson angle of every pair to the epipolar plane of its camera's motion, truncated at the knee. With x = R a
-// and the motion of the camera perturbed by [omega, v], b . (t x R a) changes by v . (x x b) + omega . ((t x x) x b).
-// A change of the length of t changes no angle. This component is removed from v's derivative; otherwise noise would
-// appear as information about the distance.
-Sums evaluate(const SE3& T_b_a, std::span<const CameraPairs> cameras, double knee) {
+// Squared Sampson angle of every pair to the epipolar plane of its camera's motion, truncated at its `inlier_angle`.
+// With x = R a and the motion of the camera perturbed by [omega, v], b . (t x R a) changes by v . (x x b) + omega . ((t
+// x x) x b). A change of the length of t changes no angle. This component is removed from v's derivative; otherwise
+// noise would appear as information about the distance.
+Sums evaluate(const SE3& T_b_a, std::span<const CameraPairs> cameras) {
   Sums out;
   for (const CameraPairs& camera : cameras) {
     const SE3 T = camera.T_cam_ref * T_b_a * camera.T_cam_ref.inverse();
@@ -48,8 +48,8 @@ Sums evaluate(const SE3& T_b_a, std::span<const CameraPairs> cameras, double kne
       const double spread =
           std::sqrt((normal - rotated * pair.b).squaredNorm() + (other - x.dot(other) * x).squaredNorm());
       const double angle = spread > 0.0 ? rotated / spread : 0.0;
-      if (!(std::abs(angle) < knee)) {
-        out.cost += 0.5 * knee * knee;
+      if (!(std::abs(angle) < camera.inlier_angle)) {
+        out.cost += 0.5 * camera.inlier_angle * camera.inlier_angle;
         continue;
       }
       const Vector3d moved = x.cross(pair.b);
@@ -70,8 +70,9 @@ Sums evaluate(const SE3& T_b_a, std::span<const CameraPairs> cameras, double kne
 
 SE3 at_distance(const SE3& T, double distance) { return {T.rotation(), distance * T.translation().normalized()}; }
 
-SE3 refine(const SE3& T_b_a, std::span<const CameraPairs> cameras, double knee) {
-  const auto equations_at = [&](const SE3& T) -> solver::NormalEquations<6> { return evaluate(T, cameras, knee); };
+SE3 refine(const SE3& T_b_a, std::span<const CameraPairs> cameras) {
+  const auto equations_at = [&](const SE3& T) -> solver::NormalEquations<6> { return evaluate(T, cameras); };
+  const double knee = std::ranges::max(cameras, {}, &CameraPairs::inlier_angle).inlier_angle;
   const auto plus = [](const SE3& T, const Vector6d& delta) { return T.perturbed(delta); };
   solver::SmallProblem<6, SE3, decltype(equations_at), decltype(plus)> problem(T_b_a, equations_at(T_b_a), equations_at,
                                                                                plus);
@@ -96,8 +97,8 @@ std::vector<Motion> refined_motions(const SE3& T_b_a, std::span<const CameraPair
   for (int i = 0; i < kDistances; ++i) {
     const double fraction = static_cast<double>(i) / (kDistances - 1);
     const double distance = options.shortest * std::pow(options.longest / options.shortest, fraction);
-    const SE3 T = refine(at_distance(T_b_a, distance), cameras, options.inlier_angle);
-    out.push_back({T, evaluate(T, cameras, options.inlier_angle)});
+    const SE3 T = refine(at_distance(T_b_a, distance), cameras);
+    out.push_back({T, evaluate(T, cameras)});
   }
   return out;
 }
@@ -117,7 +118,7 @@ double spread(const std::vector<Motion>& motions, const Motion& best, double lim
 
 std::optional<GeneralisedScale> generalised_scale(const SE3& T_b_a, std::span<const CameraPairs> cameras,
                                                   const GeneralisedScaleOptions& options) {
-  if (!(T_b_a.translation().norm() > 0.0)) return std::nullopt;
+  if (cameras.empty() || !(T_b_a.translation().norm() > 0.0)) return std::nullopt;
   GeneralisedScale out;
   const std::vector<Motion> motions = refined_motions(T_b_a, cameras, options);
   const Motion& best = *std::ranges::min_element(motions, {}, [](const Motion& m) { return m.sums.cost; });

@@ -15,11 +15,11 @@ namespace bslam::estimators {
 struct CameraPairs {
   geometry::SE3 T_cam_ref;  // the identity for the reference camera
   std::vector<BearingPair> pairs;
+  double inlier_angle = 2e-3;  // rad, maximum angle between a bearing and the epipolar plane of the other
 };
 
 struct GeneralisedScaleOptions {
   double shortest = 0.005, longest = 5.0;  // metres, range of the translation of the reference
-  double inlier_angle = 2e-3;              // rad, maximum angle between a bearing and the epipolar plane of the other
 };
 
 struct GeneralisedScale {

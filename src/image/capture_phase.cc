@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <iterator>
+#include <numeric>
 
 #include "base/median.h"
 #include "image/frame_grouping.h"
@@ -116,20 +117,53 @@ std::optional<CapturePhase> capture_phase(const std::vector<TimeNs>& camera0, co
   return found ? std::optional(found->phase) : std::nullopt;
 }
 
+namespace {
+
+// Returns the first of these cameras, at least one, or another one that is faster by half.
+std::size_t fast_camera(std::span<const std::vector<TimeNs>> times, std::span<const std::size_t> cameras) {
+  const auto period_ns = [&](std::size_t c) {
+    return times[c].size() < kMinImages ? kMaxPeriod : median_interval(times[c]);
+  };
+  std::size_t best = cameras.front();
+  for (const std::size_t c : cameras) {
+    if (period_ns(c) < period_ns(best) / 3 * 2) best = c;
+  }
+  return best;
+}
+
+// Sets the phases of these cameras relative to the reference if its period is known. `phases`: the former ones.
+void set_phases(std::span<const std::vector<TimeNs>> times, std::size_t reference, std::span<const std::size_t> cameras,
+                TimeNs tolerance_ns, bool live, CapturePhases& phases) {
+  const TimeNs period_ns = median_interval(times[reference]);
+  if (period_ns <= 0 || period_ns > kMaxPeriod) return;
+  for (const std::size_t c : cameras) {
+    CapturePhase& phase = phases.cameras[c];
+    if (std::optional<Estimate> found = estimate(times[reference], times[c], period_ns, phase)) {
+      if (!live) found->drift_ns = 0;  // all images, not only the newest ones
+      phase = next_phase(*found, phase, tolerance_ns, period_ns);
+    }
+    if (phase.constant) phases.tolerance_ns = std::max({phases.tolerance_ns, tolerance_ns, period_ns / 10});
+  }
+}
+
+}  // namespace
+
 CapturePhases capture_phases(std::span<const std::vector<TimeNs>> times, TimeNs tolerance_ns,
                              std::span<const CapturePhase> before) {
   CapturePhases out{std::vector<CapturePhase>(times.size()), tolerance_ns};
   std::ranges::copy(before, out.cameras.begin());
-  const TimeNs period_ns = median_interval(times[0]);
-  const bool has_period = period_ns > 0 && period_ns <= kMaxPeriod;
-  for (std::size_t c = 1; c < times.size() && has_period; ++c) {
-    CapturePhase& phase = out.cameras[c];
-    if (std::optional<Estimate> found = estimate(times[0], times[c], period_ns, phase)) {
-      if (before.empty()) found->drift_ns = 0;  // all images, not only the newest ones
-      phase = next_phase(*found, phase, tolerance_ns, period_ns);
-    }
-    if (phase.constant) out.tolerance_ns = std::max(tolerance_ns, period_ns / 10);
+  std::vector<std::size_t> cameras(times.size() - 1);
+  std::iota(cameras.begin(), cameras.end(), 1);
+  set_phases(times, 0, cameras, tolerance_ns, !before.empty(), out);
+  if (times[0].size() >= 2) std::erase_if(cameras, [&](std::size_t c) { return out.cameras[c].constant; });
+  if (cameras.size() < 2) return out;
+  const std::size_t reference = fast_camera(times, cameras);
+  out.cameras[reference] = {};
+  std::erase(cameras, reference);
+  for (const std::size_t c : cameras) {
+    if (!before.empty()) out.cameras[c] = before[c];
   }
+  set_phases(times, reference, cameras, tolerance_ns, !before.empty(), out);
   return out;
 }
 

@@ -95,6 +95,7 @@ double least_length(const TwoView& view, const camera::Rig& rig) {
 // would be accepted.
 Unit choose_unit(const TwoView& view, const FramePairs& pairs, const camera::Rig& rig,
                  const InitialisationOptions& options) {
+  constexpr double kNoise_px = 1.25;  // pixels of small images are larger than the usual bound
   std::vector<double> depths;
   for (std::size_t i = 0; i < view.pairs.size(); ++i) {
     if (view.pose.inlier[i]) depths.push_back(view.pose.points_a[i].norm());
@@ -103,7 +104,8 @@ Unit choose_unit(const TwoView& view, const FramePairs& pairs, const camera::Rig
   if (rig.size() == 1) return {1.0 / depth, std::numeric_limits<double>::infinity()};
   std::vector<estimators::CameraPairs> cameras;
   for (std::size_t c = 0; c < rig.size(); ++c) {
-    cameras.push_back({rig.cam_from_rig(c) * rig.rig_from_cam(view.camera), pairs.bearings[c]});
+    auto& camera = cameras.emplace_back(rig.cam_from_rig(c) * rig.rig_from_cam(view.camera), pairs.bearings[c]);
+    camera.inlier_angle = std::max(camera.inlier_angle, kNoise_px * rig.camera(c).radians_per_pixel());
   }
   const auto found = estimators::generalised_scale(view.pose.T_b_a, cameras);
   if (found && found->deviation <= options.max_scale_deviation)

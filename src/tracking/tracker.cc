@@ -29,6 +29,15 @@ void readmit_sharp_cameras(const std::vector<std::uint8_t>& blurred, FrontEndSta
   state.blurred = blurred;
 }
 
+// Counts for how long each camera has not been used while others were.
+void count_unused(TimeNs time_ns, const std::vector<std::uint8_t>& out, FrontEndState& state) {
+  const TimeNs passed_ns = state.unused_ns.empty() ? 0 : time_ns - state.planned_ns;
+  state.planned_ns = time_ns;
+  state.unused_ns.resize(out.size(), 0);
+  if (std::ranges::find(out, std::uint8_t{0}) == out.end()) return;
+  for (std::size_t c = 0; c < out.size(); ++c) state.unused_ns[c] = out[c] ? state.unused_ns[c] + passed_ns : 0;
+}
+
 // Attributes the change of the pose since the last frame to the motion of the rig (T_rig_odom) if tracking was
 // continuous, else to T_map_odom. Corrections of the map since the last frame change T_map_odom.
 void update_odometry(const map::BundledMap& map, const TrackerState& before, TrackOutcome& outcome) {
@@ -79,6 +88,8 @@ void record_motion(TrackOutcome& outcome) {
 FrontEndState FrontEndState::restarted() const {
   FrontEndState state;
   state.blurred = blurred;
+  state.planned_ns = planned_ns;
+  state.unused_ns = unused_ns;
   state.reduction = reduction;
   state.rig_corrections = rig_corrections;
   state.T_rig_odom = T_rig_odom;
@@ -104,6 +115,7 @@ FramePlan Tracker::plan(const image::ImageBundle& images, const ImageFaults& fau
   FramePlan plan;
   std::vector<std::uint8_t> out(rig_.size());
   for (std::size_t c = 0; c < out.size(); ++c) out[c] = faults.outage[c] != CameraReason::kNone;
+  count_unused(images.time_ns, out, state);
   const bool recent = to_seconds(images.time_ns - state.track.time_ns) <= kMaxPrediction_s;
   const bool motion_known = state.track.twist && recent;
   const bool motion_matters = options_.tracking.use_capture_times && !motion_known;

@@ -60,6 +60,8 @@ struct PendingKeyframe {
 struct FrontEndState {
   TrackerState track;
   std::vector<std::uint8_t> blurred;       // cameras that were blurred in the last frame
+  TimeNs planned_ns = 0;                   // time of the last frame
+  std::vector<TimeNs> unused_ns;           // per camera, time since its last used image during which others were used
   std::vector<double> budget_fractions;    // per camera, fraction of the feature budget; empty: equal fractions
   std::vector<double> calibration_errors;  // per camera, px; empty: not estimated
   // During a monocular initialisation: the reference frame, and all frames since, beginning with the reference.
@@ -198,6 +200,7 @@ class Tracker {
   // tracker_start.cc
   void start(Input& input, TrackOutcome& outcome) const;
   std::optional<StartedMap> initialise(const Input& input, const FrontEndState& state, map::MapDraft& draft) const;
+  std::vector<std::uint8_t> gone_cameras(const FrontEndState& state) const;
   void keep_reference_frame(Input& input, FrontEndState& state) const;
   bool correct_rig(const Input& input, TrackOutcome& outcome) const;
   void complete_start(const map::CommitReport& report, TrackOutcome& outcome) const;

@@ -75,18 +75,31 @@ void Tracker::start(Input& input, TrackOutcome& outcome) const {
 std::optional<StartedMap> Tracker::initialise(const Input& input, const FrontEndState& state,
                                               map::MapDraft& draft) const {
   const InitialisationOptions& options = options_.tracking.initialisation;
-  const bool overlap = rig_.any_overlap();
+  const std::vector<std::uint8_t> gone = gone_cameras(state);
+  const bool overlap = rig_.any_overlap(gone);
   if (overlap) {
     if (auto started = initialise_metric(input.frame, input.pyramids, options, draft)) return started;
   }
-  // The scale is a property of the whole map. Overlapping cameras will start a metric submap sooner or later.
+  // The scale is a property of the whole map. Overlapping cameras will start a metric submap sooner or later, and one
+  // camera alone never does.
   const bool metric = input.map->num_keyframes() > 0 && input.map->scale() == map::Scale::kMetric;
-  if (metric && (overlap || rig_.size() == 1)) return std::nullopt;
+  const bool single = std::ranges::count(gone, std::uint8_t{0}) <= 1;
+  if (metric && (overlap || single)) return std::nullopt;
   const int metric_attempts = overlap ? kMetricAttempts : 0;
   if (!state.start_reference || input.frame.id.value() - state.start_reference->frame->id.value() < metric_attempts)
     return std::nullopt;
   const Random random(options_.seed, "start", static_cast<std::uint64_t>(input.frame.id.value()));
   return initialise_monocular(*state.start_reference, input.frame, input.pyramids, options, random, draft);
+}
+
+// Per camera of the rig: whether it belongs to another rig of the map, or has not been used for long.
+std::vector<std::uint8_t> Tracker::gone_cameras(const FrontEndState& state) const {
+  constexpr double kGone_s = 2.0;
+  const std::size_t first = options_.first_camera, n = options_.num_cameras > 0 ? options_.num_cameras : rig_.size();
+  std::vector<std::uint8_t> out(rig_.size(), 1);
+  for (std::size_t c = first; c < first + n; ++c)
+    out[c] = c < state.unused_ns.size() && to_seconds(state.unused_ns[c]) > kGone_s;
+  return out;
 }
 
 // Proposes a correction of the rig if the frame shows that one is needed. The caller commits it and processes the frame

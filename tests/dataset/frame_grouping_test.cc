@@ -193,5 +193,27 @@ TEST(FrameGrouping, LostImagesAndOtherRatesAreNoConstantDelay) {
   }
 }
 
+// The others fire one after the other; camera 0 accompanies every fourth of their images, or has a rate of its own.
+TEST(FrameGrouping, FasterCamerasShareFramesWhateverTheRateOfCamera0) {
+  for (const double period : {200.0, 123.4}) {
+    const auto g = group({at_ms(every_ms(7, period, 40, 1)), at_ms(every_ms(0, 50, 160, 1, 2)),
+                          at_ms(every_ms(12, 50, 160, 1, 3)), at_ms(every_ms(24, 50, 160, 1, 4))});
+    int common = 0;
+    for (const FrameEntry& frame : g.frames) {
+      if (!frame.images[1] || !frame.images[2] || !frame.images[3]) continue;
+      ++common;
+      EXPECT_NEAR(static_cast<double>(frame.images[2]->time_ns - frame.images[1]->time_ns) / 1e6, 12, 2);
+      EXPECT_NEAR(static_cast<double>(frame.images[3]->time_ns - frame.images[1]->time_ns) / 1e6, 24, 2);
+    }
+    EXPECT_GE(common, 150) << period;
+    EXPECT_LE(g.frames.size(), 210u) << period;
+  }
+}
+
+TEST(FrameGrouping, CamerasShareFramesWithoutCamera0) {
+  const auto g = group({at_ms({0}), at_ms(every_ms(0, 50, 40)), at_ms(every_ms(20, 50, 40))});
+  EXPECT_LE(g.frames.size(), 41u);
+}
+
 }  // namespace
 }  // namespace bslam::dataset

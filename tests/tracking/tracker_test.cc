@@ -351,26 +351,58 @@ TEST(Tracker, StartsANewSubmapIfItStaysLost) {
   EXPECT_EQ(started.root, run.store.snapshot()->roots().back());
 }
 
-// Cameras without overlap start a submap without scale, so that the map has none until it is known again.
-TEST(Tracker, AMetricMapOfCamerasWithoutOverlapGetsANewSubmap) {
-  TrackerOptions options;
+// Starts a map, declares it metric, loses the pose and continues, all without images of the cameras `missing`. Returns
+// the frame with which a second submap is started; nullopt: with none of the next 80 frames.
+std::optional<int> second_submap(const camera::Rig& rig, TrackerOptions options, const std::vector<int>& missing) {
   options.new_submap_after = 3;
-  const std::vector<int> apart = {2, 3};
-  const camera::Rig rig = synthetic::default_rig().subset(apart);
-  ASSERT_FALSE(rig.any_overlap());
   TrackerRun run(simulator(rig, room(1, 0.25), {.radius = 2.2, .period_s = 20}), options);
+  const std::size_t n = rig.size();
+  ImageFaults faults{std::vector<CameraReason>(n), std::vector<std::uint8_t>(n), std::vector<std::uint8_t>(n)};
+  for (const int c : missing) faults.outage[static_cast<std::size_t>(c)] = CameraReason::kBlack;
+  const auto process = [&](int i) {
+    image::ImageBundle images;
+    images.images.resize(n);
+    images.time_ns = run.frame(i).time_ns;
+    run.tracker.plan(images, faults, run.state);
+    return run.process(run.sim.frame(FrameId(i), TrackerRun::time_s(i), missing).frame);
+  };
   int i = 0;
-  while (i < 60 && run.process(run.frame(i)).result.status != TrackStatus::kTracking) ++i;
+  while (i < 60 && process(i).result.status != TrackStatus::kTracking) ++i;
   map::MapDraft draft(run.store.snapshot());
   draft.set_scale(map::Scale::kMetric);
   run.store.commit(std::move(draft));
   run.state.track.anchored = {};
-  for (int end = i + 60; i < end && run.store.snapshot()->roots().size() < 2; ++i) run.process(run.frame(i));
-  EXPECT_EQ(run.store.snapshot()->roots().size(), 2u);
+  for (int end = i + 80; i < end && run.store.snapshot()->roots().size() < 2; ++i) process(i);
+  if (run.store.snapshot()->roots().size() < 2) return std::nullopt;
   EXPECT_EQ(run.store.snapshot()->scale(), map::Scale::kUnobservable);
+  return i;
 }
 
-// Two images of one instant, or stamps of their arrival: noise divided by a millisecond is a large velocity.
+// Cameras without overlap start a submap without scale, so that the map has none until it is known again.
+TEST(Tracker, AMetricMapOfCamerasWithoutOverlapGetsANewSubmap) {
+  const std::vector<int> apart = {2, 3};
+  const camera::Rig rig = synthetic::default_rig().subset(apart);
+  ASSERT_FALSE(rig.any_overlap());
+  EXPECT_TRUE(second_submap(rig, {}, {}).has_value());
+}
+
+TEST(Tracker, ACameraThatHasFailedForSecondsDoesNotPreventANewSubmap) {
+  const camera::Rig rig = synthetic::ring_rig(4);  // only the cameras 0 and 1 overlap
+  const std::optional<int> started = second_submap(rig, {}, {1});
+  ASSERT_TRUE(started.has_value());
+  EXPECT_GT(TrackerRun::time_s(*started), 2.0);                              // it may return
+  EXPECT_FALSE(second_submap(synthetic::ring_rig(2), {}, {1}).has_value());  // the scale of one camera stays unknown
+}
+
+TEST(Tracker, CamerasOfAnotherRigOfTheMapDoNotPreventANewSubmap) {
+  TrackerOptions options;
+  options.first_camera = 2;
+  options.num_cameras = 2;
+  EXPECT_TRUE(second_submap(synthetic::default_rig(), options, {0, 1}).has_value());
+  options.num_cameras = 1;
+  EXPECT_FALSE(second_submap(synthetic::default_rig(), options, {0, 1, 3}).has_value());
+}
+
 TEST(Tracker, KeepsTheTwistIfAFrameFollowsImmediately) {
   TrackerRun run(synthetic::ring_rig(2));
   for (int i = 0; i < 6; ++i) run.process(run.frame(i));
