@@ -77,9 +77,10 @@ struct Startup {
 // used.
 class BSLAM_EXPORT System {
  public:
-  // Errors: inconsistent settings (localize_only without a map, calibration.refine=true without final_adjustment, a map
-  // without place recognition); a map or vocabulary that cannot be read; a map that has no keyframes or was made with a
-  // different feature pyramid or vocabulary.
+  // Errors: inconsistent settings (localize_only without a map; calibration.refine=true without final_adjustment, with
+  // localize_only, or in a map of another rig or calibration; a map without place recognition); a map or vocabulary
+  // that cannot be read; a map that has no keyframes or was made with a different feature pyramid or vocabulary; an
+  // exception of the callback `log`.
   static Result<System> create(const Rig& rig, const Config& config, Startup startup = {});
   System(System&& other) noexcept;
   System& operator=(System&& other) noexcept;

@@ -26,7 +26,7 @@ std::vector<LandmarkId> most_observed(const map::BundledMap& map, const std::vec
   return out;
 }
 
-// Returns up to `limit` other keyframes, those that observe the largest number of these landmarks, in order of id.
+// Returns up to `limit` other keyframes, those that observe the largest number of these landmarks.
 std::vector<KeyframeId> other_observers(const map::BundledMap& map, const std::vector<LandmarkId>& landmarks,
                                         const std::vector<KeyframeId>& window, int limit) {
   std::vector<int> count(map.keyframe_slots(), 0);

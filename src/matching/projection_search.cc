@@ -21,9 +21,20 @@ struct Candidate {
   std::uint32_t keypoint = 0;
 };
 
-// The range of distances is extended by 20 %, because levels overlap.
-bool in_range(const SearchPoint& p, double distance) {
-  return p.max_distance <= 0 || (distance > 0.8 * p.min_distance && distance < 1.2 * p.max_distance);
+// The range of distances of a point is extended by 20 %, because levels overlap.
+struct RangeExtension {
+  double farther = 1.2, nearer = 0.8;
+
+  // By less than one and a half levels, so that the levels searched include one of the image.
+  static RangeExtension of_levels(double scale_factor) {
+    const double most = std::pow(scale_factor, 1.49);
+    return {std::min(1.2, most), std::max(0.8, 1.0 / most)};
+  }
+};
+
+bool in_range(const SearchPoint& p, double distance, const RangeExtension& extension) {
+  return p.max_distance <= 0 ||
+         (distance > extension.nearer * p.min_distance && distance < extension.farther * p.max_distance);
 }
 
 // Level on which the point is predicted at this distance.
@@ -39,7 +50,8 @@ struct Projection {
 // An image into which points are projected.
 class View {
  public:
-  View(const camera::Rig& rig, CameraIndex c, const geometry::SE3& T_cam_common, double max_view_angle)
+  View(const camera::Rig& rig, CameraIndex c, const geometry::SE3& T_cam_common, double max_view_angle,
+       const RangeExtension& range)
       : camera_(rig.camera(c)),
         shutter_(rig.shutter(c.index())),
         R_(T_cam_common.matrix3()),
@@ -47,14 +59,15 @@ class View {
         centre_(-R_.transpose() * t_),
         axis_(R_.row(2).transpose()),
         min_cosine_(std::cos(max_view_angle)),
-        min_axis_cosine_(rig.min_axis_cosine(c)) {}
+        min_axis_cosine_(rig.min_axis_cosine(c)),
+        range_(range) {}
 
   // Projection of a point. Returns nullopt if it is outside the image, its distances, or its cone of viewing
   // directions.
   std::optional<Projection> project(const SearchPoint& p) const {
     const Vector3d ray = p.position - centre_;
     const double distance = ray.norm();
-    if (!in_range(p, distance) || ray.dot(axis_) < min_axis_cosine_ * distance) return std::nullopt;
+    if (!in_range(p, distance, range_) || ray.dot(axis_) < min_axis_cosine_ * distance) return std::nullopt;
     const bool outside_cone = ray.dot(p.view_direction) < min_cosine_ * distance;
     if (outside_cone && p.view_direction != Vector3d::Zero()) return std::nullopt;
     const auto pixel = camera::project(camera_, shutter_, R_ * p.position + t_);
@@ -69,6 +82,7 @@ class View {
   Vector3d t_, centre_, axis_;  // metres; centre and optical axis in the common frame
   // Minimum cosines of the angle between viewing directions and of the angle to the optical axis.
   double min_cosine_, min_axis_cosine_;
+  RangeExtension range_;
 };
 
 Candidate best_candidate(const feature::Keypoints& keypoints, const feature::Descriptor& descriptor,
@@ -103,7 +117,7 @@ ProjectionSearchResult search_by_projection(const camera::Rig& rig, CameraIndex 
   const feature::Keypoints& keypoints = frame.keypoints;
   const double log_factor = std::log(options.scale_factor);
   const double radius_px = std::max(options.radius / camera.radians_per_pixel(), kMinRadius_px);
-  const View view(rig, c, T_cam_common, options.max_view_angle);
+  const View view(rig, c, T_cam_common, options.max_view_angle, RangeExtension::of_levels(options.scale_factor));
   std::vector<std::uint32_t> near;
   std::vector<std::pair<int, std::uint32_t>> owner(keypoints.size(), {kNone, 0});  // (hamming, position in matches)
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -161,7 +175,7 @@ std::vector<geometry::SE3> camera_poses(const camera::Rig& rig, const geometry::
 
 std::vector<VisiblePoint> visible_points(const camera::Rig& rig, CameraIndex c, const geometry::SE3& T_cam_common,
                                          std::span<const SearchPoint> points, double max_view_angle) {
-  const View view(rig, c, T_cam_common, max_view_angle);
+  const View view(rig, c, T_cam_common, max_view_angle, {});
   std::vector<VisiblePoint> out;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const auto projected = view.project(points[i]);

@@ -89,7 +89,8 @@ std::vector<std::optional<geometry::PoseUncertainty::Effect>> effects_of_rig(
   return deviation ? equations.rig_effects(options.marginals, *deviation) : unknown;
 }
 
-// The uncertainty of the poses at the values of `adjusted`, whose rig is constant.
+// The uncertainty of the poses, whose rig is constant: the noise at the values where `adjusted` was linearised last,
+// the effect of the rig at its final values.
 std::vector<std::optional<geometry::PoseUncertainty>> uncertainties_of(
     const ReprojectionProblem& problem, const BundleStructure& structure, const BundleOptions& options, Kernel kernel,
     const std::vector<double>& chi2, std::span<const std::uint8_t> skip, BundleEquations& adjusted) {

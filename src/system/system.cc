@@ -80,6 +80,11 @@ void System::discard_map() {
     if (record.result.status != tracking::TrackStatus::kTracking) continue;
     record.result.status = tracking::TrackStatus::kLost;
     record.result.reason = tracking::LostReason::kNotStarted;
+    record.result.anchored = {};
+    record.result.covariance.reset();
+    record.twist.reset();
+    record.relocalisation.reset();
+    record.root = KeyframeId();
     record.keyframe = false;
   }
   early_.clear();

@@ -72,10 +72,32 @@ std::optional<TwoView> best_two_view(const FramePairs& pairs, const camera::Rig&
 }
 
 // Length assigned to the distance between the two frames (before: 1), and its relative standard deviation.
-struct Unit {
+struct InitialScale {
   double length = 1;
   double deviation = std::numeric_limits<double>::infinity();
 };
+
+// The scale at which the points of the two views have the depths of matched features, which become landmarks as well:
+// the median of the ratios. Returns nullopt if fewer than three features show it.
+std::optional<InitialScale> scale_of_matched_features(const TwoView& view, const BundledFrame& first,
+                                                      const camera::Rig& rig, const InitialisationOptions& options) {
+  constexpr std::size_t kMinFeatures = 3;
+  constexpr double kSigmaOfMedian = 1.4826;  // standard deviation per median absolute deviation of normal noise
+  const CameraIndex camera(view.camera);
+  std::vector<double> ratios;
+  for (std::size_t i = 0; i < view.pairs.size(); ++i) {
+    if (!view.pose.inlier[i]) continue;
+    const FeatureId f = first.bundled.feature(camera, view.pairs[i].a);
+    if (f.index() >= first.bundled.num_matched() || !has_accurate_depth(first.bundled.point(f), options)) continue;
+    const double depth = (rig.cam_from_rig(view.camera) * first.bundled.point(f)->point_rig).norm();
+    ratios.push_back(depth / view.pose.points_a[i].norm());
+  }
+  if (ratios.size() < kMinFeatures) return std::nullopt;
+  const double ratio = median(ratios);
+  for (double& r : ratios) r = std::abs(std::log(r / ratio));
+  const double deviation = kSigmaOfMedian * median(ratios) + options.max_depth_error;
+  return InitialScale{ratio, deviation / std::sqrt(static_cast<double>(ratios.size()))};
+}
 
 // Returns the length of the motion of a camera above which the rotation of the rig changes the direction of motion of
 // the other cameras by less than can be measured.
@@ -93,8 +115,8 @@ double least_length(const TwoView& view, const camera::Rig& rig) {
 // If the scale cannot be estimated well, it must not be chosen too small: in a small map the rotation of the rig moves
 // the other cameras in clearly different directions, and their wrong matches that happen to agree with these directions
 // would be accepted.
-Unit choose_unit(const TwoView& view, const FramePairs& pairs, const camera::Rig& rig,
-                 const InitialisationOptions& options) {
+InitialScale choose_scale(const TwoView& view, const FramePairs& pairs, const BundledFrame& first,
+                          const camera::Rig& rig, const InitialisationOptions& options) {
   constexpr double kNoise_px = 1.25;  // pixels of small images are larger than the usual bound
   std::vector<double> depths;
   for (std::size_t i = 0; i < view.pairs.size(); ++i) {
@@ -102,6 +124,7 @@ Unit choose_unit(const TwoView& view, const FramePairs& pairs, const camera::Rig
   }
   const double depth = median(depths);
   if (rig.size() == 1) return {1.0 / depth, std::numeric_limits<double>::infinity()};
+  if (const auto found = scale_of_matched_features(view, first, rig, options)) return *found;
   std::vector<estimators::CameraPairs> cameras;
   for (std::size_t c = 0; c < rig.size(); ++c) {
     auto& camera = cameras.emplace_back(rig.cam_from_rig(c) * rig.rig_from_cam(view.camera), pairs.bearings[c]);
@@ -145,14 +168,13 @@ std::optional<StartedMap> initialise_monocular(const StartCandidate& first, cons
   const FramePairs pairs = match_cameras(*first.frame, frame);
   const auto view = best_two_view(pairs, rig, options, random.next());
   if (!view) return std::nullopt;
-  const Unit chosen = choose_unit(*view, pairs, rig, options);
-  const double unit = chosen.length;
-  const SE3 T_b_a(view->pose.T_b_a.rotation(), unit * view->pose.T_b_a.translation());
+  const InitialScale scale = choose_scale(*view, pairs, *first.frame, rig, options);
+  const SE3 T_b_a(view->pose.T_b_a.rotation(), scale.length * view->pose.T_b_a.translation());
   const SE3 T_cam_rig = rig.cam_from_rig(view->camera), T_rig_cam = T_cam_rig.inverse();
 
   StartedMap out;
   out.scale = rig.size() == 1 ? map::Scale::kUpToScale : map::Scale::kUnobservable;
-  out.scale_deviation = chosen.deviation;
+  out.scale_deviation = scale.deviation;
   out.keyframes.push_back(make_keyframe(*first.frame, {}, SE3(), first.pyramids, KeyframeId(), options, draft));
   const KeyframeId key_a = out.keyframes[0].keyframe;
   out.keyframes.push_back(make_keyframe(frame, {}, T_rig_cam * T_b_a * T_cam_rig, pyramids, key_a, options, draft));
@@ -163,8 +185,9 @@ std::optional<StartedMap> initialise_monocular(const StartCandidate& first, cons
     const FeatureId fa = draft.map().keyframe(key_a).frame->bundled.feature(camera, view->pairs[i].a);
     const FeatureId fb = draft.map().keyframe(key_b).frame->bundled.feature(camera, view->pairs[i].b);
     if (draft.map().landmark_of(key_a, fa).valid() || draft.map().landmark_of(key_b, fb).valid()) continue;
-    const LandmarkId l = draft.add_landmark(T_rig_cam * (unit * view->pose.points_a[i]), {{key_a, fa}, {key_b, fb}},
-                                            {key_a, {camera, view->pairs[i].a}});
+    const LandmarkId l =
+        draft.add_landmark(T_rig_cam * (scale.length * view->pose.points_a[i]),
+                           {{key_a, fa}, {key_b, fb, /*aligned=*/false}}, {key_a, {camera, view->pairs[i].a}});
     for (NewKeyframe& k : out.keyframes) k.landmarks.push_back(l);
   }
   return out;

@@ -32,9 +32,10 @@ bool comparable(const frame::BundledFrame& first, const frame::BundledFrame& sec
 
 // Writes two keyframes, the first at the origin, if the relative pose of some camera can be estimated between `first`
 // and `frame`; else returns nullopt. With one camera the unit is the median depth of the points in the first keyframe,
-// and the scale is not estimated later. With several cameras the scale is estimated from the matches of all cameras
-// (estimators/generalised_scale.h); if that is too uncertain, the median depth is assumed or a larger scale at which
-// the cameras move in one direction. In all cases the scale is unobservable until mapping has measured it.
+// and the scale is not estimated later. With several cameras the scale is that of the matched features with accurate
+// depth, or is estimated from the matches of all cameras (estimators/generalised_scale.h); if that is too uncertain,
+// the median depth is assumed or a larger scale at which the cameras move in one direction. In all cases the scale is
+// unobservable until mapping has measured it.
 std::optional<StartedMap> initialise_monocular(const StartCandidate& first, const frame::BundledFrame& frame,
                                                std::span<const image::Pyramid> pyramids,
                                                const InitialisationOptions& options, Random random,

@@ -28,10 +28,7 @@ bool has_camera(const std::vector<KeypointRef>& group, CameraIndex camera) {
   return std::any_of(group.begin(), group.end(), [&](const KeypointRef& r) { return r.camera == camera; });
 }
 
-struct Groups {
-  std::vector<std::vector<KeypointRef>> matched;  // two or more keypoints
-  std::vector<LandmarkId> landmark;               // landmark of each; invalid: none
-};
+using Groups = std::vector<std::vector<KeypointRef>>;  // of two or more keypoints
 
 using KeypointsByLandmark = std::map<LandmarkId, std::vector<KeypointRef>>;
 
@@ -82,8 +79,7 @@ Groups regroup(const BundledFrame& frame, const LandmarkTable& table, const came
   for (std::size_t f = 0; f < frame.bundled.num_matched(); ++f) {
     const FeatureContent feature = content_of(frame.bundled.keypoints(FeatureId(f)), table);
     if (!feature.owner.valid() && feature.free.size() >= 2) {
-      groups.matched.push_back(feature.free);
-      groups.landmark.push_back(LandmarkId());
+      groups.push_back(feature.free);
     } else if (feature.owner.valid() && !feature.ambiguous) {
       std::vector<KeypointRef>& known = by_landmark[feature.owner];
       for (const KeypointRef r : feature.free) {
@@ -94,8 +90,7 @@ Groups regroup(const BundledFrame& frame, const LandmarkTable& table, const came
   for (auto& [landmark, keypoints] : by_landmark) {
     if (keypoints.size() < 2) continue;
     std::sort(keypoints.begin(), keypoints.end());
-    groups.matched.push_back(keypoints);
-    groups.landmark.push_back(landmark);
+    groups.push_back(keypoints);
   }
   return groups;
 }
@@ -124,7 +119,7 @@ std::shared_ptr<const BundledFrame> keyframe_of(const BundledFrame& frame, const
     for (std::size_t k = 0; k < patches.size(); ++k) patches[k] = patch_at_pixel(pyramids[c], keypoints, k);
     keypoints.patch = std::move(patches);
   }
-  out->bundled = matching::make_bundled(rig, out->cameras, groups.matched, options.min_parallax, options.max_chi2);
+  out->bundled = matching::make_bundled(rig, out->cameras, groups, options.min_parallax, options.max_chi2);
   return out;
 }
 

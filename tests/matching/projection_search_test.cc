@@ -125,6 +125,19 @@ TEST_F(SearchByProjection, SearchesOnlyWithinTheDistanceRange) {
   EXPECT_EQ(near, 0u);
 }
 
+// Levels that differ by 5 % in scale: 15 % beyond the range are three levels beyond the image.
+TEST_F(SearchByProjection, LeavesOutPointsThatAreOnNoLevelOfTheImage) {
+  for (SearchPoint& p : points) {
+    const double distance = (p.position - T_cam_common.inverse().translation()).norm();
+    p.max_distance = static_cast<float>(distance / 1.15);
+    p.min_distance = static_cast<float>(distance / 1.5);
+  }
+  EXPECT_EQ(search().visible.size(), kPoints);
+  ProjectionSearchOptions options;
+  options.scale_factor = 1.05;
+  EXPECT_TRUE(search(options).visible.empty());
+}
+
 TEST_F(SearchByProjection, IgnoresPointsBehindOrOutsideTheImage) {
   for (SearchPoint& p : points) p.position = T_cam_common.inverse() * -(T_cam_common * p.position);
   const ProjectionSearchResult result = search();

@@ -184,8 +184,11 @@ class SystemContradictedMap : public ::testing::Test {
 
 TEST_F(SystemContradictedMap, IsDiscardedIfItIsNew) {
   System system(tour_.rig(), small_config(execution::Mode::kSequential));
-  EXPECT_TRUE(contradict(system, 8).map_withdrawn);
+  const FrameRecord withdrawn = contradict(system, 8);
+  EXPECT_TRUE(withdrawn.map_withdrawn);
   EXPECT_EQ(tracked_frames(system), 0u);
+  EXPECT_FALSE(withdrawn.result.anchored.reference.valid());
+  EXPECT_FALSE(withdrawn.twist.has_value());
   EXPECT_FALSE(contradict(system, 60).map_withdrawn);
   EXPECT_EQ(tracked_frames(system), 61u);
 }

@@ -180,6 +180,36 @@ TEST_F(InitialiseMonocular, TheScaleOfSmallImagesIsAsUncertainAsItSays) {
   EXPECT_LT(squared_z / static_cast<double>(found.size()), 1.0);
 }
 
+// A start of overlapping cameras that have too few features with accurate depth for a metric one.
+TEST_F(InitialiseMonocular, AgreesWithTheDepthOfMatchedFeatures) {
+  const auto sim = simulator(synthetic::ring_rig(2), room(1, 0.25), {.radius = 2.2, .period_s = 20});
+  const auto first = sim.frame(FrameId(0), 0.0);
+  auto second = first;
+  InitialisationOptions options;
+  options.assumed_median_depth = 100.0;
+  map::MapDraft draft = empty_draft(sim);
+  std::optional<StartedMap> started;
+  for (int i = 1; i <= 30 && !started; ++i) {
+    second = sim.frame(FrameId(i), 0.05 * i);
+    started = start(first, second, draft, options);
+  }
+  ASSERT_TRUE(started.has_value());
+  EXPECT_EQ(started->scale, map::Scale::kUnobservable);
+  EXPECT_LE(started->scale_deviation, 0.1);
+  const SE3 found = draft.map().keyframe(KeyframeId(1)).T_rig_world,
+            truth = second.T_world_rig.inverse() * first.T_world_rig;
+  EXPECT_NEAR(found.translation().norm() / truth.translation().norm(), 1.0, 0.1);
+  std::size_t in_two_frames = 0;
+  for (const LandmarkId l : draft.map().landmark_ids()) {
+    for (const map::Observation& o : draft.map().observations(l)) {
+      const bool reference = o.keyframe == draft.map().landmark(l).reference.keyframe;
+      EXPECT_EQ(o.aligned, reference) << "matched by its descriptor";
+      in_two_frames += !reference;
+    }
+  }
+  EXPECT_GE(in_two_frames, 10u);
+}
+
 TEST_F(InitialiseMonocular, AssumesTheDepthIfTwoFramesDoNotDetermineTheScale) {
   const auto sim = simulator(three_sides(), room(1, 0.25));
   map::MapDraft draft = empty_draft(sim);
