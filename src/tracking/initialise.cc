@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 #include "base/median.h"
 #include "estimators/generalised_scale.h"
@@ -127,8 +128,9 @@ InitialScale choose_scale(const TwoView& view, const FramePairs& pairs, const Bu
   if (const auto found = scale_of_matched_features(view, first, rig, options)) return *found;
   std::vector<estimators::CameraPairs> cameras;
   for (std::size_t c = 0; c < rig.size(); ++c) {
-    auto& camera = cameras.emplace_back(rig.cam_from_rig(c) * rig.rig_from_cam(view.camera), pairs.bearings[c]);
+    estimators::CameraPairs camera{rig.cam_from_rig(c) * rig.rig_from_cam(view.camera), pairs.bearings[c]};
     camera.inlier_angle = std::max(camera.inlier_angle, kNoise_px * rig.camera(c).radians_per_pixel());
+    cameras.push_back(std::move(camera));
   }
   const auto found = estimators::generalised_scale(view.pose.T_b_a, cameras);
   if (found && found->deviation <= options.max_scale_deviation)
