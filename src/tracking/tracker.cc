@@ -76,6 +76,12 @@ std::optional<EstimatedPose> estimate_of(const DirectAttempt& direct) {
   return EstimatedPose{direct.outcome->record.result.T_rig_world, direct.all_cameras};
 }
 
+// The options with the number of cameras of the run.
+TrackerOptions of_rig(TrackerOptions options, const camera::Rig& rig) {
+  if (options.num_cameras == 0) options.num_cameras = rig.size();
+  return options;
+}
+
 // Copies the motion from the state to the record.
 void record_motion(TrackOutcome& outcome) {
   if (is_tracking(outcome.record.result.status)) outcome.record.twist = outcome.next.track.twist;
@@ -99,7 +105,7 @@ FrontEndState FrontEndState::restarted() const {
 
 Tracker::Tracker(const camera::Rig& rig, const TrackerOptions& options, ThreadPool& pool,
                  std::unique_ptr<Relocaliser> relocaliser)
-    : rig_(rig), options_(options), pool_(pool), relocaliser_(std::move(relocaliser)) {
+    : rig_(rig), options_(of_rig(options, rig)), pool_(pool), relocaliser_(std::move(relocaliser)) {
   for (std::size_t i = 0; i < levels_.size(); ++i) {
     const int level = static_cast<int>(i);
     levels_[i] = {reduced(options.features, level), reduced(options.tracking, level)};
@@ -132,7 +138,7 @@ FramePlan Tracker::plan(const image::ImageBundle& images, const ImageFaults& fau
 // Per camera of the rig; the budget of the rig is divided among the cameras of the run.
 std::vector<int> Tracker::budgets(const FrontEndState& state, std::span<const std::uint8_t> skipped,
                                   std::span<const std::uint8_t> failing) const {
-  const std::size_t first = options_.first_camera, n = options_.num_cameras > 0 ? options_.num_cameras : rig_.size();
+  const std::size_t first = options_.first_camera, n = options_.num_cameras;
   const auto of_run = [&](auto values) { return values.empty() ? values : values.subspan(first, n); };
   const std::span<const double> fractions = state.budget_fractions;
   const std::vector<int> found =

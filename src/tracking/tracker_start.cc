@@ -95,7 +95,7 @@ std::optional<StartedMap> Tracker::initialise(const Input& input, const FrontEnd
 // Per camera of the rig: whether it belongs to another rig of the map, or has not been used for long.
 std::vector<std::uint8_t> Tracker::gone_cameras(const FrontEndState& state) const {
   constexpr double kGone_s = 2.0;
-  const std::size_t first = options_.first_camera, n = options_.num_cameras > 0 ? options_.num_cameras : rig_.size();
+  const std::size_t first = options_.first_camera, n = options_.num_cameras;
   std::vector<std::uint8_t> out(rig_.size(), 1);
   for (std::size_t c = first; c < first + n; ++c)
     out[c] = c < state.unused_ns.size() && to_seconds(state.unused_ns[c]) > kGone_s;
