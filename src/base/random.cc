@@ -47,6 +47,14 @@ std::uint32_t Random::below(std::uint32_t n) {
   return static_cast<std::uint32_t>(draw % n);
 }
 
+std::array<std::uint32_t, 3> Random::three_below(std::uint32_t n) {
+  std::array<std::uint32_t, 3> out{};
+  do {
+    for (std::uint32_t& i : out) i = below(n);
+  } while (out[0] == out[1] || out[0] == out[2] || out[1] == out[2]);
+  return out;
+}
+
 double Random::uniform() { return static_cast<double>(next() >> 11) * 0x1.0p-53; }
 
 double Random::uniform(double low, double high) { return low + (high - low) * uniform(); }

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/median.h"
+#include "solver/reprojection.h"
 
 namespace bslam::calibration {
 namespace {
@@ -40,9 +41,9 @@ void for_each_error(const map::BundledMap& map, KeyframeId k, const Add& add) {
       const camera::Camera& camera = map.rig().camera(ref.camera);
       const Eigen::Vector2f& pixel = map.keypoints(k, ref.camera).pixel[ref.keypoint.index()];
       const Eigen::Vector3d point_cam = T_cam_world[ref.camera.index()] * map.landmark(landmark).position;
-      const auto projected =
-          camera.project(shutters[ref.camera.index()].at_row(point_cam, static_cast<double>(pixel.y())));
-      if (projected) add(ref.camera.index(), pixel, Eigen::Vector2d(pixel.cast<double>() - *projected));
+      const auto error =
+          solver::residual_error(camera.model, shutters[ref.camera.index()], point_cam, pixel.cast<double>());
+      if (error) add(ref.camera.index(), pixel, *error);
     }
   }
 }

@@ -5,6 +5,7 @@
 
 #include "map/search_points.h"
 #include "matching/projection_search.h"
+#include "solver/reprojection.h"
 
 namespace bslam::calibration {
 namespace {
@@ -74,10 +75,10 @@ void search_keyframe(const map::BundledMap& map, const camera::Rig& rig, std::si
     const feature::Keypoints& keypoints = frame.cameras[c].keypoints;
     for (const matching::ProjectionMatch& m : results[c].matches) {
       const Eigen::Vector2f pixel = keypoints.pixel[m.keypoint.index()];
-      const auto projected = rig.camera(c).project(
-          moving.shutter(c).at_row(T_cam_world[c] * points[m.point].position, static_cast<double>(pixel.y())));
+      const auto error = solver::residual_error(rig.camera(c).model, moving.shutter(c),
+                                                T_cam_world[c] * points[m.point].position, pixel.cast<double>());
       const double sigma = features.sigma(keypoints.level[m.keypoint.index()]);
-      if (!projected || (pixel.cast<double>() - *projected).squaredNorm() > kMaxRecoveredChi2 * sigma * sigma) continue;
+      if (!error || error->squaredNorm() > kMaxRecoveredChi2 * sigma * sigma) continue;
       selected.problem.observations.push_back(
           {static_cast<int>(pose), static_cast<int>(m.point), CameraIndex(c), pixel, static_cast<float>(sigma)});
       selected.sources.push_back({selected.landmarks[m.point], keyframe});

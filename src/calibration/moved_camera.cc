@@ -36,14 +36,9 @@ using Observation = solver::ReprojectionProblem::Observation;
 // The point of an observation in the frame of camera c of the problem when the row of the pixel was exposed.
 Eigen::Vector3d point_in_camera(const solver::ReprojectionProblem& problem, const solver::RigValues& values,
                                 const Observation& o, std::size_t c) {
-  const auto pose = static_cast<std::size_t>(o.pose);
-  SE3 T_cam_rig = values.T_cam_rig[c];
-  if (!problem.motion.empty()) T_cam_rig = T_cam_rig * problem.motion[pose * values.T_cam_rig.size() + c];
-  const Eigen::Vector3d point =
-      T_cam_rig * (problem.T_rig_world[pose] * problem.points[static_cast<std::size_t>(o.point)]);
-  if (problem.twist.empty()) return point;
-  return camera::Shutter(problem.rig->camera(c), values.timing[c], T_cam_rig, problem.twist[pose])
-      .at_row(point, static_cast<double>(o.pixel.y()));
+  const Eigen::Vector3d point_rig =
+      problem.T_rig_world[static_cast<std::size_t>(o.pose)] * problem.points[static_cast<std::size_t>(o.point)];
+  return solver::point_in_camera(problem, values, o, c, point_rig);
 }
 
 // The cost of an observation with the extrinsics of camera c of the problem.

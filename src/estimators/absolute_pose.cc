@@ -48,10 +48,7 @@ Sample draw(std::span<const Ray> rays, Random& random) {
   const auto n = static_cast<std::uint32_t>(rays.size());
   Sample sample{};
   for (int attempt = 0; attempt < kRedraws; ++attempt) {
-    std::array<std::uint32_t, 3> index{};
-    do {
-      for (std::uint32_t& i : index) i = random.below(n);
-    } while (index[0] == index[1] || index[0] == index[2] || index[1] == index[2]);
+    const std::array<std::uint32_t, 3> index = random.three_below(n);
     for (std::size_t k = 0; k < 3; ++k) sample[k] = &rays[index[k]];
     if (distinct_points(sample)) break;
   }

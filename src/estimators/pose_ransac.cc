@@ -41,11 +41,7 @@ std::optional<SE3> solve_minimal(const Rig& rig, const Sample& sample, const SE3
 
 // Three different items among those that project at the initial pose.
 Sample draw(std::span<const solver::PoseProblem::Item* const> candidates, Random& random) {
-  const auto n = static_cast<std::uint32_t>(candidates.size());
-  std::array<std::uint32_t, 3> index{};
-  do {
-    for (std::uint32_t& i : index) i = random.below(n);
-  } while (index[0] == index[1] || index[0] == index[2] || index[1] == index[2]);
+  const std::array<std::uint32_t, 3> index = random.three_below(static_cast<std::uint32_t>(candidates.size()));
   return {candidates[index[0]], candidates[index[1]], candidates[index[2]]};
 }
 

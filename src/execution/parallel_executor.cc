@@ -175,16 +175,23 @@ class ParallelExecutor : public StageExecutor {
     changed_.notify_all();
   }
 
+  // Drops the tasks of stages that a commit supersedes. Called with the commit and before any other, so that no result
+  // of these tasks is committed after it.
+  void drop(const std::vector<Stage>& stages) {
+    const std::lock_guard lock(mutex_);
+    for (const Stage stage : stages) drop(queue(stage));
+    changed_.notify_all();  // their queues have space
+  }
+
   bool run(StageTask& task, const std::stop_token& stop) {
     const Stopwatch watch;
     const map::MapSnapshot base = gate_.newest();
     StageResult result = setup_.functions[task.stage](task, base, stop);
-    // Before the commit, so that no result of a superseded task is committed after it.
-    for (const Stage superseded : superseded_by(task.stage, result, *gate_.newest())) {
-      const std::lock_guard lock(mutex_);
-      drop(queue(superseded));
-      changed_.notify_all();  // its queue has space
-    }
+    result.committed = [this, stages = superseded_by(task.stage, result, *base),
+                        then = std::move(result.committed)](const map::CommitReport& report) {
+      drop(stages);
+      if (then) then(report);
+    };
     const bool committed = gate_.commit_stage(task, base->version(), std::move(result), stop);
     observe(setup_, {task, watch.ms(), committed});
     return committed;

@@ -5,6 +5,7 @@
 #include "map/keyframe_landmarks.h"
 #include "map/search_points.h"
 #include "matching/projection_search.h"
+#include "solver/reprojection.h"
 
 namespace bslam::mapping {
 namespace {
@@ -15,11 +16,10 @@ using geometry::SE3;
 bool agrees(const map::BundledMap& map, LandmarkId l, const camera::Rig& rig, std::size_t c, const SE3& T_cam_world,
             const feature::Keypoints& keypoints, std::size_t k, const LandmarkFusionOptions& options,
             const feature::FeatureModel& features) {
-  const double row = static_cast<double>(keypoints.pixel[k].y());
-  const auto pixel = rig.camera(c).project(rig.shutter(c).at_row(T_cam_world * map.landmark(l).position, row));
-  if (!pixel) return false;
+  const auto error = solver::residual_error(rig.camera(c).model, rig.shutter(c), T_cam_world * map.landmark(l).position,
+                                            keypoints.pixel[k].cast<double>());
   const double sigma = features.sigma(keypoints.level[k]);
-  return (keypoints.pixel[k].cast<double>() - *pixel).squaredNorm() < options.max_chi2 * sigma * sigma;
+  return error && error->squaredNorm() < options.max_chi2 * sigma * sigma;
 }
 
 // Adds the feature as an observation of landmark l or, if the feature already has another landmark, merges the two.

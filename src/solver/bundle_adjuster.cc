@@ -156,6 +156,18 @@ void check_problem(const ReprojectionProblem& problem) {
   }
 }
 
+Vector3d point_in_camera(const ReprojectionProblem& problem, const RigValues& rig,
+                         const ReprojectionProblem::Observation& o, std::size_t camera, const Vector3d& point_rig) {
+  const auto pose = static_cast<std::size_t>(o.pose);
+  const SE3& T_cam_rig = rig.T_cam_rig[camera];
+  const SE3* motion = problem.motion.empty() ? nullptr : &problem.motion[pose * problem.rig->size() + camera];
+  const Vector3d point_cam = T_cam_rig * (motion ? *motion * point_rig : point_rig);
+  if (problem.twist.empty()) return point_cam;
+  const camera::Shutter shutter(problem.rig->camera(camera), rig.timing[camera],
+                                motion ? T_cam_rig * *motion : T_cam_rig, problem.twist[pose]);
+  return shutter.at_row(point_cam, static_cast<double>(o.pixel.y()));
+}
+
 std::vector<double> squared_errors(const ReprojectionProblem& problem) {
   BSLAM_ASSERT(problem.rig != nullptr, "the problem must have a rig");
   return squared_errors(problem, problem.T_rig_world, problem.points, RigValues::of(*problem.rig));
@@ -175,19 +187,10 @@ std::vector<double> squared_errors(const ReprojectionProblem& problem, std::span
   std::vector<double> out;
   out.reserve(problem.observations.size());
   for (const ReprojectionProblem::Observation& o : problem.observations) {
-    const auto pose = static_cast<std::size_t>(o.pose);
-    Vector3d point_rig = T_rig_world[pose] * points[static_cast<std::size_t>(o.point)];
-    if (!problem.motion.empty()) point_rig = problem.motion[pose * problem.rig->size() + o.camera.index()] * point_rig;
-    const std::size_t camera = o.camera.index();
-    Vector3d point_cam = rig.T_cam_rig[camera] * point_rig;
-    if (!problem.twist.empty()) {
-      const SE3 T_cam_rig = problem.motion.empty()
-                                ? rig.T_cam_rig[camera]
-                                : rig.T_cam_rig[camera] * problem.motion[pose * problem.rig->size() + camera];
-      const camera::Shutter shutter(problem.rig->camera(camera), rig.timing[camera], T_cam_rig, problem.twist[pose]);
-      point_cam = shutter.at_row(point_cam, static_cast<double>(o.pixel.y()));
-    }
-    const auto error = residual_error(rig.models[camera], point_cam, o.pixel.cast<double>());
+    const Vector3d point_rig =
+        T_rig_world[static_cast<std::size_t>(o.pose)] * points[static_cast<std::size_t>(o.point)];
+    const Vector3d point_cam = point_in_camera(problem, rig, o, o.camera.index(), point_rig);
+    const auto error = residual_error(rig.models[o.camera.index()], point_cam, o.pixel.cast<double>());
     const double sigma = static_cast<double>(o.sigma);
     out.push_back(error ? error->squaredNorm() / (sigma * sigma) : std::numeric_limits<double>::infinity());
   }

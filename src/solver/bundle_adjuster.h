@@ -79,6 +79,12 @@ BundleSummary adjust(ReprojectionProblem& problem, const BundleOptions& options,
 // points and cameras. Every function that reads the observations of a problem does this first.
 void check_problem(const ReprojectionProblem& problem);
 
+// The point of an observation in the frame of a camera when the row of the observed pixel was exposed. `point_rig`: the
+// point at the time of the pose. `camera` is that of the observation, or one of the same model that may have taken it.
+Vector3d point_in_camera(const ReprojectionProblem& problem, const RigValues& rig,
+                         const ReprojectionProblem::Observation& observation, std::size_t camera,
+                         const Vector3d& point_rig);
+
 // Squared normalised error of each observation at the problem's values; infinite if it does not project.
 std::vector<double> squared_errors(const ReprojectionProblem& problem);
 // Flags the errors that exceed `bound` or are NaN.

@@ -20,7 +20,7 @@ std::optional<ReprojectionResidual> ReprojectionResidual::evaluate(const Rig& ri
 std::optional<Vector2d> ReprojectionResidual::error_only(const Rig& rig, CameraIndex i, const SE3& T_rig_world,
                                                          const Vector3d& point_world, const Vector2d& pixel) {
   const Vector3d point_cam = rig.cam_from_rig(i) * (T_rig_world * point_world);
-  return residual_error(rig.camera(i).model, rig.shutter(i.index()).at_row(point_cam, pixel.y()), pixel);
+  return residual_error(rig.camera(i).model, rig.shutter(i.index()), point_cam, pixel);
 }
 
 }  // namespace bslam::solver

@@ -47,6 +47,11 @@ inline std::optional<Vector2d> residual_error(const camera::CameraModel& model, 
                                               const Vector2d& pixel) {
   return std::visit([&](const auto& m) { return residual_error(m, point_cam, pixel); }, model);
 }
+// The same for a camera that moves during the exposure; `point_cam` are the coordinates at the capture time.
+inline std::optional<Vector2d> residual_error(const camera::CameraModel& model, const camera::Shutter& shutter,
+                                              const Vector3d& point_cam, const Vector2d& pixel) {
+  return residual_error(model, shutter.at_row(point_cam, pixel.y()), pixel);
+}
 
 // Chain rule for a pose: J [-[p]x  I], transposed, where p = T q and J is the Jacobian with respect to p. It belongs to
 // the left perturbation of T, rotation first.

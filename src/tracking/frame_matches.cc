@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "map/search_points.h"
+#include "solver/reprojection.h"
 
 namespace bslam::tracking {
 
@@ -181,8 +182,8 @@ std::vector<std::vector<std::optional<double>>> squared_errors(const map::Bundle
     for (const Match& m : matches[c]) {
       const Eigen::Vector2d pixel = frame.cameras[c].keypoints.pixel[m.keypoint.index()].cast<double>();
       const Eigen::Vector3d point = T_cam_world * map.landmark(m.landmark).position;
-      const auto projected = rig.camera(c).project(rig.shutter(c).at_row(point, pixel.y()));
-      out[c].push_back(projected ? std::optional((pixel - *projected).squaredNorm()) : std::nullopt);
+      const auto error = solver::residual_error(rig.camera(c).model, rig.shutter(c), point, pixel);
+      out[c].push_back(error ? std::optional(error->squaredNorm()) : std::nullopt);
     }
   }
   return out;

@@ -205,6 +205,7 @@ TrackOutcome Tracker::process(FrontEndState state, BundledFrame frame, std::span
   outcome.next = std::move(state);
   outcome.observed = observed_keypoints(frame);
   count_features(frame, outcome.record);
+  frame.twist.tail<3>() *= outcome.next.track.anchored.scale_change(*map);  // from the state, at its scale
   apply_scale_change(*map, outcome.next.track);
   pause_direct_tracking(direct.failure, outcome.next);
   outcome.next.keyframe_failed = false;

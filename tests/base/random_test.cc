@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cmath>
+#include <map>
 #include <set>
 #include <vector>
 
@@ -66,6 +67,17 @@ TEST(Random, BelowIsUniform) {
   for (const int n : counts) chi2 += std::pow(n - kDraws / 7.0, 2) / (kDraws / 7.0);
   EXPECT_LT(chi2, 22.5);  // 99.9 % quantile with 6 degrees of freedom
   EXPECT_EQ(random.below(1), 0u);
+}
+
+TEST(Random, ThreeOfThreeAreAllOfThemInEveryOrder) {
+  Random random(5);
+  std::map<std::array<std::uint32_t, 3>, int> count;
+  for (int i = 0; i < 6000; ++i) ++count[random.three_below(3)];
+  ASSERT_EQ(count.size(), 6u);
+  for (const auto& [order, n] : count) {
+    EXPECT_EQ((std::set<std::uint32_t>(order.begin(), order.end()).size()), 3u);
+    EXPECT_NEAR(n, 1000, 150);
+  }
 }
 
 TEST(Random, UniformStaysWithinItsBounds) {
