@@ -139,12 +139,22 @@ std::string table_text(const TrajectoryEvaluation& e, const EvalArguments& argum
          row("ground truth, length", fmt::format("{:.3f} m", e.gt_length_m));
 }
 
+// Tools such as evo_ape take the ground truth first.
+void note_of_order(const EvalArguments& a) {
+  const bool of_estimate = evaluation::read_comments(a.estimate).frame.empty();
+  if (of_estimate && !evaluation::read_comments(a.ground_truth).frame.empty()) {
+    print_message("note: {} was estimated by bslam, but is given as the ground truth: the estimate comes first\n",
+                  a.ground_truth);
+  }
+}
+
 Result<TrajectoryEvaluation> evaluate_files(const EvalArguments& arguments) {
   if (const Status status = check_plot(arguments); !status) return status.error();
   auto read = evaluation::read_trajectory(arguments.estimate, arguments.times);
   if (!read) return read.error();
   auto ground_truth = evaluation::read_trajectory(arguments.ground_truth, arguments.times);
   if (!ground_truth) return ground_truth.error();
+  note_of_order(arguments);
   if (arguments.gt_frame == "cam0" && std::filesystem::path(arguments.ground_truth).extension() == ".csv") {
     print_message(
         "note: EuRoC ground truth contains poses of the body; use --gt-frame body --rig FILE to compare it with "

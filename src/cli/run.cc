@@ -1,4 +1,6 @@
 // bslam run: runs the SLAM system on a recorded data set.
+#include <fmt/format.h>
+
 #include <chrono>
 #include <memory>
 #include <optional>
@@ -42,7 +44,19 @@ Result<std::optional<execution::Journal>> read_journal(const std::string& file) 
 
 // Returns the command that tests the calibration of the run against its images.
 std::string check_command(const DatasetArguments& data) {
-  return shell_command({"bslam", "rig", "info", data.rig.empty() ? data.path : data.rig, "--images", data.path});
+  std::vector<std::string> command = {"bslam",    "rig",    "info", data.rig.empty() ? data.path : data.rig,
+                                      "--images", data.path};
+  const auto add = [&](const char* option, const std::string& value) {
+    if (!value.empty()) command.insert(command.end(), {option, value});
+  };
+  const ImageArguments& images = data.images;
+  add("--topics", images.topics);
+  if (images.side_by_side) command.push_back("--side-by-side");
+  if (images.rate_hz) add("--rate", fmt::format("{}", *images.rate_hz));
+  add("--stamp-unit", images.stamp_unit);
+  add("--bayer", images.bayer);
+  add("--masks", images.masks);
+  return shell_command(command);
 }
 
 // Says which topic or folder is which camera, if the command line does not say it.

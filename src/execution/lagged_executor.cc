@@ -155,9 +155,10 @@ class LaggedExecutor : public StageExecutor {
   // stage. A stopped task is only removed. It stays in the queue until then, so that interrupt() can still stop it.
   void finish_running(Stage stage) {
     const std::shared_ptr<Job> job = queue(stage).running;
-    const bool committed = wait_for(*job) && commit_result(*job);
+    const CommitOutcome outcome = wait_for(*job) ? commit_result(*job) : CommitOutcome::kDiscarded;
     leave(stage);
-    if (committed) {
+    if (is_repeated(stage, outcome)) queue(stage).waiting.push_front(job->task);
+    if (outcome == CommitOutcome::kCommitted) {
       for (const StageTask& next : following(job->task, *gate_.newest(), setup_.functions)) push(next);
     }
     start_next(stage);
@@ -171,16 +172,16 @@ class LaggedExecutor : public StageExecutor {
   }
 
   // Commits the result of a job that is done, and reports it to the observer.
-  bool commit_result(Job& job) {
+  CommitOutcome commit_result(Job& job) {
     const std::stop_token stop = job.stop.get_token();
     if (job.failure && !stop.stop_requested()) {  // failures of a stopped task are ignored
       fail(job.failure);
       rethrow();
     }
     for (const Stage s : superseded_by(job.task.stage, job.result, *gate_.newest())) supersede(s);
-    const bool committed = gate_.commit_stage(job.task, job.base->version(), std::move(job.result), stop);
-    if (!job.observed) observe(setup_, {job.task, job.ms, committed});
-    return committed;
+    const CommitOutcome outcome = gate_.commit_stage(job.task, job.base->version(), std::move(job.result), stop);
+    if (!job.observed) observe(setup_, {job.task, job.ms, outcome == CommitOutcome::kCommitted});
+    return outcome;
   }
 
   // Removes the running task from its queue and returns it.

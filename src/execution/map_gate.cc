@@ -32,19 +32,19 @@ map::CommitReport MapGate::commit(JournalStep step, map::MapDraft draft) {
   return publish(step, frame_.value(), std::move(draft));
 }
 
-bool MapGate::commit_stage(StageTask& task, MapVersion base, StageResult result, const std::stop_token& stop) {
+CommitOutcome MapGate::commit_stage(StageTask& task, MapVersion base, StageResult result, const std::stop_token& stop) {
   const std::lock_guard order(order_);
-  if (stop.stop_requested()) return false;
+  if (stop.stop_requested()) return CommitOutcome::kDiscarded;
   if (!result.draft) {
     append({journal_step(task.stage), task.input(), base, std::nullopt});
-    return false;
+    return CommitOutcome::kDiscarded;
   }
   BSLAM_ASSERT(result.draft->map().version() == base, "a stage's draft must be based on the version passed to it");
   const map::CommitReport report = publish(journal_step(task.stage), task.input(), std::move(*result.draft));
-  if (report.rejected) return false;
+  if (report.rejected) return CommitOutcome::kRejected;
   if (task.stage == Stage::kKeyframe) task.keyframe = report.keyframes.front();
   if (result.committed) result.committed(report);
-  return true;
+  return CommitOutcome::kCommitted;
 }
 
 void MapGate::restart() {

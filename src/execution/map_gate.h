@@ -28,10 +28,9 @@ class MapGate {
   // Commits an edit of the caller's thread.
   map::CommitReport commit(JournalStep step, map::MapDraft draft);
 
-  // Commits the result of a background stage and returns true if it was committed. A task of kKeyframe gets the id of
-  // the new keyframe. If a stop was requested before, the result is discarded as if the stage had never run.
-  // Thread-safe.
-  bool commit_stage(StageTask& task, MapVersion base, StageResult result, const std::stop_token& stop);
+  // Commits the result of a background stage. A task of kKeyframe gets the id of the new keyframe. If a stop was
+  // requested before, the result is discarded as if the stage had never run. Thread-safe.
+  CommitOutcome commit_stage(StageTask& task, MapVersion base, StageResult result, const std::stop_token& stop);
 
   // Empties the map; version numbers and ids continue.
   void restart();

@@ -183,7 +183,16 @@ class ParallelExecutor : public StageExecutor {
     changed_.notify_all();  // their queues have space
   }
 
+  // Returns true if the result was committed.
   bool run(StageTask& task, const std::stop_token& stop) {
+    CommitOutcome outcome;
+    do {
+      outcome = run_once(task, stop);
+    } while (is_repeated(task.stage, outcome));
+    return outcome == CommitOutcome::kCommitted;
+  }
+
+  CommitOutcome run_once(StageTask& task, const std::stop_token& stop) {
     const Stopwatch watch;
     const map::MapSnapshot base = gate_.newest();
     StageResult result = setup_.functions[task.stage](task, base, stop);
@@ -192,9 +201,9 @@ class ParallelExecutor : public StageExecutor {
       drop(stages);
       if (then) then(report);
     };
-    const bool committed = gate_.commit_stage(task, base->version(), std::move(result), stop);
-    observe(setup_, {task, watch.ms(), committed});
-    return committed;
+    const CommitOutcome outcome = gate_.commit_stage(task, base->version(), std::move(result), stop);
+    observe(setup_, {task, watch.ms(), outcome == CommitOutcome::kCommitted});
+    return outcome;
   }
 
   MapGate& gate_;

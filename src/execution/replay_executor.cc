@@ -109,8 +109,10 @@ class ReplayExecutor : public StageExecutor {
     tasks.erase(waiting_task);
     const map::MapSnapshot base = recorded_base();
     if (task.stage != Stage::kKeyframe && task.keyframe.index() >= base->keyframe_slots()) fail("no such keyframe");
-    const bool committed = run_to_commit(task, base, gate_, setup_, stop_.get_token());
+    const CommitOutcome outcome = run_to_commit(task, base, gate_, setup_, stop_.get_token());
     if (interrupted()) return;
+    const bool committed = outcome == CommitOutcome::kCommitted;
+    if (is_repeated(task.stage, outcome)) tasks.push_front(task);
     if (committed != entry().committed.has_value()) fail(committed ? "a commit" : "no commit");
     if (committed) {
       keep(gate_.newest());

@@ -19,7 +19,8 @@ class SequentialExecutor : public StageExecutor {
   void enqueue(const StageTask& task) override {
     std::deque<StageTask> tasks = {task};
     for (; !tasks.empty() && !over(); tasks.pop_front()) {
-      if (!run_to_commit(tasks.front(), gate_.newest(), gate_, setup_, stop_.get_token())) continue;
+      const CommitOutcome outcome = run_to_commit(tasks.front(), gate_.newest(), gate_, setup_, stop_.get_token());
+      if (outcome != CommitOutcome::kCommitted) continue;
       for (const StageTask& next : following(tasks.front(), *gate_.newest(), setup_.functions)) tasks.push_back(next);
     }
   }

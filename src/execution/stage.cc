@@ -73,6 +73,11 @@ bool awaited(const StageTask& task, const map::BundledMap& newest) {
   return false;
 }
 
+bool is_repeated(Stage stage, CommitOutcome outcome) {
+  return outcome == CommitOutcome::kRejected &&
+         (stage == Stage::kMap || stage == Stage::kCalibrate || stage == Stage::kGlobal);
+}
+
 std::vector<StageTask> following(const StageTask& task, const map::BundledMap& newest,
                                  const StageFunctions& functions) {
   std::vector<StageTask> out;

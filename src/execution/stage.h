@@ -45,6 +45,17 @@ struct StageResult {
   std::function<void(const map::CommitReport&)> committed;
 };
 
+// What became of the result of a task.
+enum class CommitOutcome {
+  kCommitted,
+  kDiscarded,  // there was nothing to change, or a stop was requested
+  kRejected,   // it corrects the map, and another correction has been committed since its base (map::MapDraft)
+};
+
+// Whether a task whose result was rejected is run again, on the newest version: that of a stage whose result depends on
+// nothing but the map. A loop is found again with a later keyframe.
+bool is_repeated(Stage stage, CommitOutcome outcome);
+
 // After a stop request the result is discarded, so that the function should return early with any result. The keyframe
 // may have been removed from the version passed to the function.
 using StageFunction = std::function<StageResult(const StageTask&, const map::MapSnapshot&, std::stop_token)>;

@@ -18,13 +18,13 @@ std::unique_ptr<StageExecutor> make_stage_executor(Mode mode, MapGate& gate, Exe
   return nullptr;
 }
 
-bool run_to_commit(StageTask& task, const map::MapSnapshot& base, MapGate& gate, const ExecutionSetup& setup,
-                   const std::stop_token& stop) {
+CommitOutcome run_to_commit(StageTask& task, const map::MapSnapshot& base, MapGate& gate, const ExecutionSetup& setup,
+                            const std::stop_token& stop) {
   const Stopwatch watch;
   StageResult result = setup.functions[task.stage](task, base, stop);
-  const bool committed = gate.commit_stage(task, base->version(), std::move(result), stop);
-  observe(setup, {task, watch.ms(), committed});
-  return committed;
+  const CommitOutcome outcome = gate.commit_stage(task, base->version(), std::move(result), stop);
+  observe(setup, {task, watch.ms(), outcome == CommitOutcome::kCommitted});
+  return outcome;
 }
 
 void observe(const ExecutionSetup& setup, const StageRun& run) {

@@ -16,6 +16,15 @@ double BundledFrame::delay_s(std::size_t c) const {
   return camera.state == image::ImageState::kPresent ? to_seconds(camera.time_ns - time_ns) : 0.0;
 }
 
+BundledFrame without_images(const BundledFrame& frame) {
+  BundledFrame out;
+  out.id = frame.id;
+  out.time_ns = frame.time_ns;
+  out.cameras.resize(frame.cameras.size());
+  for (CameraFrame& camera : out.cameras) camera.time_ns = frame.time_ns;
+  return out;
+}
+
 CameraFrame refined(CameraFrame camera_frame, feature::Refinement&& refinement, const camera::Camera& camera) {
   camera_frame.keypoints = camera_frame.keypoints.refined(std::move(refinement));
   camera_frame.grid = FeatureGrid(camera_frame.keypoints, camera.width, camera.height);

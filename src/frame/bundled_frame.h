@@ -38,6 +38,9 @@ struct BundledFrame {
   double delay_s(std::size_t c) const;
 };
 
+// The frame as if no camera had delivered an image.
+BundledFrame without_images(const BundledFrame& frame);
+
 // A camera's data with its keypoints at refined positions, and their grid.
 CameraFrame refined(CameraFrame camera_frame, feature::Refinement&& refinement, const camera::Camera& camera);
 

@@ -50,8 +50,8 @@ struct VerificationOptions {
   double ratio = 0.85;   // maximum ratio of best to second best descriptor distance
   double radius = 0.02;  // rad: radius of the guided search at the estimated pose
   int min_inliers = 50;  // minimum number of inlier keypoints
-  // Minimum fraction of the landmarks predicted visible that must be matched. Places that look partly alike match
-  // fewer.
+  // Minimum fraction of the landmarks predicted visible that must be matched, or of the features of the frame if it has
+  // fewer of them, as in a place that was seen for long. Places that look partly alike match fewer.
   double min_found_ratio = 0.2;
   // rad: only landmarks whose mean viewing direction differs by at most this from the current one count as predicted
   // visible. If these are fewer than min_inliers, the limit is 1.05 rad.
@@ -68,9 +68,10 @@ struct VerificationOptions {
     visitor("ratio", self.ratio, Range{0.1, 1}, "", "maximum ratio of best to second best descriptor distance");
     visitor("radius", self.radius, Range{1e-4, 1}, "rad", "radius of the guided search at the estimated pose");
     visitor("min_inliers", self.min_inliers, Range{6, 10000}, "", "minimum number of inlier keypoints", kCommon);
-    visitor("min_found_ratio", self.min_found_ratio, Range{0, 1}, "",
-            "minimum fraction of the landmarks predicted visible that must be matched",
-            OptionNote{.formerly = "min_found_share"});
+    visitor(
+        "min_found_ratio", self.min_found_ratio, Range{0, 1}, "",
+        "minimum fraction of the landmarks predicted visible, or of the features if these are fewer, that must match",
+        OptionNote{.formerly = "min_found_share"});
     visitor("max_viewing_angle", self.max_viewing_angle, Range{0.01, 1.05}, "rad",
             "largest angle to the mean viewing direction at which a landmark is predicted visible",
             OptionNote{.formerly = "max_turn"});

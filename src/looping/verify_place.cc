@@ -195,7 +195,8 @@ std::optional<PlaceMatch> verify_place(const map::BundledMap& map, const camera:
     // With fewer, the viewing directions are mostly new, and all landmarks predicted visible are compared.
     if (out.expected >= options.min_inliers) break;
   }
-  if (out.found < options.min_found_ratio * out.expected) return rejected(Rejection::kFewFound);
+  const int most = std::min(out.expected, static_cast<int>(frame.bundled.size()));  // that can be found
+  if (out.found < options.min_found_ratio * most) return rejected(Rejection::kFewFound);
   return place_match;
 }
 

@@ -11,12 +11,13 @@
 namespace bslam::session {
 namespace {
 
-void warn_of_extrinsics(const CameraRecord& camera, bool applies, Warnings& warnings) {
+// `advise`: the estimate applies to other recordings, and no other warning says what to do with it.
+void warn_of_extrinsics(const CameraRecord& camera, bool advise, Warnings& warnings) {
   const auto& e = camera.extrinsics;
   if (!e || !e->suspect) return;
   warn(warnings, "{}: estimated extrinsics differ from the calibration by {:.2f} deg and {:.1f} mm{}", camera.name,
        e->change_deg, e->change_mm,
-       applies && !e->refined ? "; use the estimate with --set calibration.refine=true" : "");
+       advise && !e->refined ? "; use the estimate with --set calibration.refine=true" : "");
 }
 
 // Warns if focal lengths or principal points changed by much more than their standard deviations and usual calibration
@@ -140,7 +141,8 @@ std::vector<std::string> estimate_warnings(const RunRecord& record, const camera
   Warnings warnings;
   const bool contradicted = calibration.estimate.verdict == calibration::Verdict::kInconsistent;
   warn_of_moves(record, warnings);
-  for (const CameraRecord& camera : record.cameras) warn_of_extrinsics(camera, calibration.applies, warnings);
+  for (const CameraRecord& camera : record.cameras)
+    warn_of_extrinsics(camera, calibration.applies && !contradicted, warnings);
   for (std::size_t c = 0; c < std::min(calibration.estimate.cameras.size(), record.cameras.size()); ++c) {
     if (contradicted) {
       warn_of_intrinsics(rig.camera(c), calibration.estimate.cameras[c], warnings);

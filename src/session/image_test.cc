@@ -1,6 +1,8 @@
 #include "session/image_test.h"
 
 #include <algorithm>
+#include <cstdlib>
+#include <tuple>
 #include <utility>
 
 #include "dataset/frame_reader.h"
@@ -8,14 +10,52 @@
 
 namespace bslam::session {
 
+namespace {
+
+// Up to `count` frames in equal parts of the recording. In each part, the frame with the most pairs of cameras that no
+// chosen frame has, then with the most images, then the one nearest to the middle of the part: cameras of a lower rate
+// have images in few frames.
+std::vector<std::size_t> frames_with_all_pairs(const dataset::Dataset& dataset, std::size_t count) {
+  const std::size_t size = dataset.frames.size(), cameras = dataset.rig.size();
+  std::vector<std::uint8_t> seen(cameras * cameras, 0);
+  const auto for_each_pair = [&](std::size_t f, const auto& visit) {
+    const auto& images = dataset.frames[f].images;
+    for (std::size_t i = 0; i < cameras; ++i) {
+      for (std::size_t j = i; j < cameras; ++j) {
+        if (images[i] && images[j]) visit(i * cameras + j, i == j);
+      }
+    }
+  };
+  std::vector<std::size_t> out;
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::size_t begin = k * size / count, end = (k + 1) * size / count, middle = (begin + end) / 2;
+    std::tuple<int, int, std::ptrdiff_t> best{-1, 0, 0};
+    std::size_t chosen = middle;
+    for (std::size_t f = begin; f < end; ++f) {
+      int added = 0, images = 0;
+      for_each_pair(f, [&](std::size_t pair, bool single) {
+        added += !single && !seen[pair];
+        images += single;
+      });
+      const std::tuple rank{added, images,
+                            -std::abs(static_cast<std::ptrdiff_t>(f) - static_cast<std::ptrdiff_t>(middle))};
+      if (rank > best) std::tie(best, chosen) = std::pair(rank, f);
+    }
+    for_each_pair(chosen, [&](std::size_t pair, bool) { seen[pair] = 1; });
+    out.push_back(chosen);
+  }
+  return out;
+}
+
+}  // namespace
+
 Result<std::vector<calibration::PairEvidence>> test_against_images(const dataset::Dataset& dataset) {
   constexpr std::size_t kFrames = 6;
   const auto masks = image_decoding::read_masks(dataset.rig);
   if (!masks) return masks.error();
-  const std::size_t size = dataset.frames.size(), count = std::min(kFrames, size);
   std::vector<image::ImageBundle> frames;
-  for (std::size_t k = 0; k < count; ++k)
-    frames.push_back(dataset::read_frame(dataset, (2 * k + 1) * size / (2 * count)));
+  for (const std::size_t f : frames_with_all_pairs(dataset, std::min(kFrames, dataset.frames.size())))
+    frames.push_back(dataset::read_frame(dataset, f));
   return calibration::check_conventions(dataset.rig, frames, *masks);
 }
 

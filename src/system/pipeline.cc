@@ -31,11 +31,11 @@ Pipeline::Pipeline(const camera::Rig& rig, CamerasOfRun cameras, const Config& c
 Pipeline::Outcome Pipeline::process(const image::ImageBundle& images, execution::StageExecutor& executor) {
   const Stopwatch whole;
   Outcome outcome;
-  const tracking::ImageFaults faults = monitor_.examine(images, pool_);
+  tracking::ImageFaults faults = monitor_.examine(images, pool_);
   const tracking::FramePlan plan = tracker_.plan(images, faults, state_);
 
   std::vector<StageTime> stages;
-  tracking::TrackOutcome tracked = track(images, plan, executor, outcome, stages);
+  tracking::TrackOutcome tracked = track(images, plan, faults, executor, outcome, stages);
   if (tracked.edit && tracked.edit->kind == tracking::ProposedEdit::Kind::kRig)
     tracked = track_with_corrected_rig(images, plan, std::move(tracked), executor, outcome);
   tracked.record.scale = outcome.seen->scale();
@@ -48,8 +48,9 @@ Pipeline::Outcome Pipeline::process(const image::ImageBundle& images, execution:
   FrameRecord& record = outcome.record;
   record.stages.insert(record.stages.begin(), stages.begin(), stages.end());
   record.reduction = state_.reduction;
-  record.cameras =
-      status_.update(tracking::camera_evidence(images, faults, plan.postponed, record, outcome.created_cameras));
+  auto evidence = tracking::camera_evidence(images, faults, plan.postponed, record, outcome.created_cameras);
+  tracking::leave_out_inliers_of_new_map(outcome.seen->num_keyframes(), evidence);
+  record.cameras = status_.update(evidence);
   for (const image::CameraImage& i : images.images) record.images.push_back(i.state);
   record.frame_ms = whole.ms();
   return outcome;
@@ -63,8 +64,8 @@ void Pipeline::set_reduction(int level) {
 // Tracks the frame without features if possible. Its features are extracted otherwise, before the map is needed if this
 // is known from the start.
 tracking::TrackOutcome Pipeline::track(const image::ImageBundle& images, const tracking::FramePlan& plan,
-                                       execution::StageExecutor& executor, Outcome& outcome,
-                                       std::vector<StageTime>& stages) {
+                                       tracking::ImageFaults& faults, execution::StageExecutor& executor,
+                                       Outcome& outcome, std::vector<StageTime>& stages) {
   Stopwatch watch;
   const auto end_stage = [&](std::string_view stage) {
     stages.push_back({stage, watch.ms()});
@@ -78,11 +79,13 @@ tracking::TrackOutcome Pipeline::track(const image::ImageBundle& images, const t
     preparation_.bundle(plan, frame);
     end_stage("bundle");
   };
-  const bool directly = tracker_.tracks_directly(state_);
+  bool directly = tracker_.tracks_directly(state_);
   if (!directly) add_features();
   outcome.seen = executor.begin_frame(frame.id);
+  frame.twist.tail<3>() *= state_.track.anchored.scale_change(*outcome.seen);  // planned at the scale of the state
   const bool recalibrated = preparation_.adopt_rig(*outcome.seen, frame);
   const auto created = adopt_keyframe(outcome);
+  if (drop_repeated(*outcome.seen, faults, frame)) directly = false;
   if (config_.mode != execution::Mode::kSequential) end_stage("results");
 
   tracking::DirectAttempt direct;
@@ -102,6 +105,15 @@ tracking::TrackOutcome Pipeline::track(const image::ImageBundle& images, const t
   found.record.created = created;
   if (found.keyframe_wanted) outcome.deferred = defer_keyframe(plan, std::move(frame), found);
   return found;
+}
+
+// Removes the images of a frame that repeat those of the frame before although the rig moves.
+bool Pipeline::drop_repeated(const map::BundledMap& map, tracking::ImageFaults& faults, BundledFrame& frame) {
+  state_.stalled = tracker_.stalled(state_, faults.repeated, map);
+  if (!state_.stalled) return false;
+  std::ranges::replace(faults.outage, tracking::CameraReason::kNone, tracking::CameraReason::kFrozen);
+  frame = frame::without_images(frame);
+  return true;
 }
 
 // Commits the correction of the rig that a frame gave before a map was started, and bundles and processes the features
@@ -149,9 +161,9 @@ void Pipeline::commit(tracking::TrackOutcome& tracked, execution::StageExecutor&
   tracking::ProposedEdit& edit = *tracked.edit;
   const map::CommitReport report = executor.commit(journal_step(edit.kind), std::move(edit.draft));
   tracker_.committed(report, tracked);
-  tracked.record.scale = report.published->scale();
   outcome.keyframes = report.keyframes;
   outcome.started_submap = edit.kind == tracking::ProposedEdit::Kind::kStart;
+  if (outcome.started_submap) tracked.record.scale = report.published->scale();
   tracked.record.stages.back().ms += watch.ms();  // added to the time of the stage that proposed the edit
 }
 

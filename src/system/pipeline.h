@@ -59,7 +59,9 @@ class Pipeline {
 
  private:
   tracking::TrackOutcome track(const image::ImageBundle& images, const tracking::FramePlan& plan,
-                               execution::StageExecutor& executor, Outcome& outcome, std::vector<StageTime>& stages);
+                               tracking::ImageFaults& faults, execution::StageExecutor& executor, Outcome& outcome,
+                               std::vector<StageTime>& stages);
+  bool drop_repeated(const map::BundledMap& map, tracking::ImageFaults& faults, frame::BundledFrame& frame);
   FrameId defer_keyframe(const tracking::FramePlan& plan, frame::BundledFrame frame,
                          const tracking::TrackOutcome& found);
   std::optional<tracking::CreatedKeyframe> adopt_keyframe(Outcome& outcome);

@@ -23,4 +23,10 @@ std::vector<CameraEvidence> camera_evidence(const image::ImageBundle& images, co
   return out;
 }
 
+void leave_out_inliers_of_new_map(std::size_t keyframes, std::vector<CameraEvidence>& evidence) {
+  constexpr std::size_t kFew = 4;
+  if (keyframes >= kFew) return;
+  for (CameraEvidence& camera : evidence) camera.keypoints = camera.inliers = 0;
+}
+
 }  // namespace bslam::tracking

@@ -18,4 +18,8 @@ std::vector<CameraEvidence> camera_evidence(const image::ImageBundle& images, co
                                             std::span<const std::uint8_t> postponed, const FrameRecord& record,
                                             std::span<const CameraCounts> created);
 
+// Leaves the numbers of inliers out while the map has few keyframes: landmarks in the view of a camera that overlaps no
+// other one are created from several keyframes of a moving rig, and without them none of its keypoints can agree.
+void leave_out_inliers_of_new_map(std::size_t keyframes, std::vector<CameraEvidence>& evidence);
+
 }  // namespace bslam::tracking

@@ -109,7 +109,9 @@ ImageFaults CameraMonitor::examine(const image::ImageBundle& images, ThreadPool&
     const image::CameraImage& input = images.images[c];
     if (input.state == image::ImageState::kPresent) health[c] = image_health(input.view(), options_);
   });
-  ImageFaults faults{find_outages(health), find_blurred(health), {}};
+  ImageFaults faults;
+  faults.outage = find_outages(health, faults.repeated);
+  faults.blurred = find_blurred(health);
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
     const CameraReason outage = faults.outage[c];
     int& missed = cameras_[c].missed;
@@ -120,7 +122,7 @@ ImageFaults CameraMonitor::examine(const image::ImageBundle& images, ThreadPool&
   return faults;
 }
 
-std::vector<CameraReason> CameraMonitor::find_outages(const Health& images) {
+std::vector<CameraReason> CameraMonitor::find_outages(const Health& images, bool& repeated) {
   std::vector<CameraReason> found(cameras_.size(), CameraReason::kNoImages);
   std::vector<std::uint8_t> same(cameras_.size(), 0);
   bool any_changed = false;
@@ -151,6 +153,13 @@ std::vector<CameraReason> CameraMonitor::find_outages(const Health& images) {
     }
   }
   admit_if_none_is_left(images, found);
+  bool any = false, any_new = false;
+  for (std::size_t c = 0; c < cameras_.size(); ++c) {
+    if (found[c] != CameraReason::kNone) continue;
+    any = true;
+    any_new |= !same[c];
+  }
+  repeated = any && !any_new;
   return found;
 }
 

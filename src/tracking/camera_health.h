@@ -55,6 +55,7 @@ struct ImageFaults {
   std::vector<CameraReason> outage;   // reason why the camera is not used in this frame; kNone: it is used
   std::vector<std::uint8_t> blurred;  // out of focus or smeared, but used
   std::vector<std::uint8_t> failing;  // not used; false if only an image is missing, as between images of a slow camera
+  bool repeated = false;  // every image that is used is identical to the previous one of its camera, and there is one
 };
 
 class CameraMonitor {
@@ -68,12 +69,12 @@ class CameraMonitor {
   using Health = std::vector<std::optional<ImageHealth>>;  // per camera; nullopt: it has no image
 
   // Per camera, why it is not used in this frame. An image is frozen if it is identical to the previous image of its
-  // camera while the image of another camera has changed; frozen images are thus not detected with a single camera or
-  // if all images are identical. After a few identical images, as of a driver that repeats the images of a slow camera,
-  // the next one is used at once. A camera without an image is not used in that frame, and used again with its next
-  // image. If all other cameras are out as well, a camera with a good image is used immediately. If no image is good,
-  // the cameras whose images are only partly over-exposed are used.
-  std::vector<CameraReason> find_outages(const Health& images);
+  // camera while the image of another camera has changed. If all images are identical, the rig may be at rest: see
+  // ImageFaults::repeated and Tracker::stalled. After a few identical images, as of a driver that repeats the images of
+  // a slow camera, the next one is used at once. A camera without an image is not used in that frame, and used again
+  // with its next image. If all other cameras are out as well, a camera with a good image is used immediately. If no
+  // image is good, the cameras whose images are only partly over-exposed are used.
+  std::vector<CameraReason> find_outages(const Health& images, bool& repeated);
   void admit_if_none_is_left(const Health& images, std::vector<CameraReason>& found);
   // Per camera: whether it is out of focus or smeared, determined from the slope of the edges in its image. Rows and
   // columns are searched, so that motion blur in one direction is not detected as blur. A blurred camera is still

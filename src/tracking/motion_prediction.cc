@@ -1,5 +1,9 @@
 #include "tracking/motion_prediction.h"
 
+#include <utility>
+
+#include "base/median.h"
+
 namespace bslam::tracking {
 
 using geometry::SE3;
@@ -41,6 +45,25 @@ solver::MotionModel motion_model(const TrackInput& input, const frame::BundledFr
   motion.gain = (1.0 + ahead) / dt;
   motion.offset = -ahead * *input.state.twist;
   return motion;
+}
+
+double image_motion_px(const map::BundledMap& map, const TrackerState& state) {
+  if (!state.twist || !state.anchored.known_in(map)) return 0.0;
+  const SE3 T_after = state.anchored.resolve(map).value();
+  const SE3 T_before = SE3::exp(-state.twist_interval_s * *state.twist) * T_after;
+  const camera::Rig& rig = map.rig();
+  std::vector<double> motions;
+  for (std::size_t c = 0; c < state.cameras.size(); ++c) {
+    for (const LandmarkId seen : state.cameras[c].landmarks) {
+      const LandmarkId l = map.resolve(seen);
+      if (!l.valid()) continue;
+      const Eigen::Vector3d& point = map.landmark(l).position;
+      const auto before = rig.camera(c).project(rig.cam_from_rig(c) * (T_before * point));
+      const auto after = rig.camera(c).project(rig.cam_from_rig(c) * (T_after * point));
+      if (before && after) motions.push_back((*after - *before).norm());
+    }
+  }
+  return motions.empty() ? 0.0 : median(std::move(motions));
 }
 
 }  // namespace bslam::tracking

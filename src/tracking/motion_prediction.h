@@ -20,6 +20,10 @@ geometry::SE3 last_pose(const TrackInput& input);
 // The last pose, advanced by the motion model if the motion is known.
 geometry::SE3 predict(const TrackInput& input, TimeNs time_ns);
 
+// Median distance, in pixels, by which the landmarks of the last frame moved in the images between the two frames from
+// which the twist was computed; 0 if it is not known.
+double image_motion_px(const map::BundledMap& map, const TrackerState& state);
+
 // Motion during the capture of a frame: the motion since the last frame, extrapolated with its acceleration with
 // respect to the interval before, or the last motion if that is kept. It is a function of the poses. It must not be
 // estimated as a free variable from cameras with other capture times: the landmarks that they re-observe were created

@@ -28,7 +28,7 @@ TrackResult result_at(const map::BundledMap& map, const frame::BundledFrame& fra
   out.T_rig_world = T_rig_world;
   out.anchored = map::AnchoredPose::at(map, reference, T_rig_world);
   for (const frame::CameraFrame& c : frame.cameras)
-    out.cameras.push_back({static_cast<int>(c.keypoints.size()), 0, 0, false});
+    out.cameras.push_back({.keypoints = static_cast<int>(c.keypoints.size())});
   return out;
 }
 

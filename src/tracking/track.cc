@@ -134,14 +134,26 @@ bool track_in_wide_windows(const TrackInput& input, const std::vector<LandmarkId
   return wider > radius && track_in_wide_windows(input, landmarks, wider, options, pool, out);
 }
 
+// Whether several cameras, and no fewer than are left, were excluded in this frame.
+bool half_excluded(const Coarse& coarse, const std::vector<std::uint8_t>& before, int min_expected) {
+  int excluded = 0, checked = 0;
+  for (std::size_t c = 0; c < coarse.reobserved.size(); ++c) {
+    if (before[c] || coarse.reobserved[c].expected < min_expected) continue;
+    ++checked;
+    excluded += coarse.excluded[c];
+  }
+  return excluded >= 2 && 2 * excluded >= checked;
+}
+
 // Pose from the landmarks of the last frame, searched for near the prediction of the motion model. If that finds too
 // few or no motion is known, a search in wide windows precedes it. Narrow windows around an assumed motion would find
-// matches that seem to confirm the assumption.
+// matches that seem to confirm the assumption. A pose other than the predicted one is wrong if half of the cameras do
+// not see what they saw before: similar things elsewhere were taken for the landmarks of the others.
 Coarse track_last_frame(const TrackInput& input, const frame::BundledFrame& frame, const TrackingOptions& options,
                         ThreadPool& pool) {
   const std::vector<LandmarkId> landmarks = last_landmarks(input.map, input.state);
-  Coarse out{
-      frame, predict(input, frame.time_ns), {}, LostReason::kFewMatches, excluded(input.state, input.map.rig().size())};
+  const std::vector<std::uint8_t> before = excluded(input.state, input.map.rig().size());
+  Coarse out{frame, predict(input, frame.time_ns), {}, LostReason::kFewMatches, before};
   const bool tracking = input.state.status == TrackStatus::kTracking;
   const bool predicted = tracking && motion_since_last(input.state, frame.time_ns);
   if (predicted && track_in_narrow_windows(input, landmarks, options, pool, out)) return out;
@@ -151,6 +163,7 @@ Coarse track_last_frame(const TrackInput& input, const frame::BundledFrame& fram
     found = track_in_wide_windows(input, landmarks, options, pool, out);
   }
   if (tracking && (found || !predicted)) track_in_narrow_windows(input, landmarks, options, pool, out);
+  if (half_excluded(out, before, options.consensus.min_expected)) out.reason = LostReason::kUnstablePose;
   return out;
 }
 

@@ -7,6 +7,7 @@
 #include "frame/capture_times.h"
 #include "tracking/calibration_error.h"
 #include "tracking/feature_budget.h"
+#include "tracking/motion_prediction.h"
 
 namespace bslam::tracking {
 namespace {
@@ -148,6 +149,12 @@ std::vector<int> Tracker::budgets(const FrontEndState& state, std::span<const st
   return out;
 }
 
+bool Tracker::stalled(const FrontEndState& state, bool repeated, const map::BundledMap& map) const {
+  constexpr double kMoving_px = 1.0;
+  if (!repeated || state.stalled) return repeated;
+  return is_tracking(state.track.status) && image_motion_px(map, state.track) > kMoving_px;
+}
+
 bool Tracker::tracks_directly(const FrontEndState& state) const {
   const FrontEnd front_end = options_.tracking.frontend;
   if (front_end == FrontEnd::kFeatures || (front_end == FrontEnd::kAuto && state.direct_pause > 0)) return false;
@@ -205,7 +212,6 @@ TrackOutcome Tracker::process(FrontEndState state, BundledFrame frame, std::span
   outcome.next = std::move(state);
   outcome.observed = observed_keypoints(frame);
   count_features(frame, outcome.record);
-  frame.twist.tail<3>() *= outcome.next.track.anchored.scale_change(*map);  // from the state, at its scale
   apply_scale_change(*map, outcome.next.track);
   pause_direct_tracking(direct.failure, outcome.next);
   outcome.next.keyframe_failed = false;
@@ -221,11 +227,8 @@ TrackOutcome Tracker::process(FrontEndState state, BundledFrame frame, std::span
 
 void Tracker::committed(const map::CommitReport& report, TrackOutcome& outcome) const {
   outcome.record.keyframe = true;
-  if (outcome.edit->kind == ProposedEdit::Kind::kStart) {
-    complete_start(report, outcome);
-  } else {
-    complete_keyframe(report, outcome);
-  }
+  if (outcome.edit->kind == ProposedEdit::Kind::kKeyframe) return complete_keyframe(report, outcome);
+  complete_start(report, outcome);
   record_motion(outcome);
 }
 
@@ -303,14 +306,16 @@ bool Tracker::gives_up(const FrontEndState& state, TimeNs time_ns) const {
 }
 
 // The next frames search for the rig where its last motion would have taken it, or near its last pose if that is too
-// long ago. After too many lost frames a new submap is started.
+// long ago. After too many lost frames a new submap is started. A short time without images is no reason to search
+// elsewhere.
 void Tracker::handle_lost(Input& input, const TrackerState& before, TrackOutcome& outcome) {
   FrontEndState& state = outcome.next;
   const TrackResult result = outcome.record.result;
   state.track = before;
-  state.track.status = TrackStatus::kLost;
+  const bool recent = to_seconds(result.time_ns - before.time_ns) <= kMaxPrediction_s;
+  if (result.reason != LostReason::kNoImages || !recent) state.track.status = TrackStatus::kLost;
   state.pending.reset();
-  if (to_seconds(result.time_ns - before.time_ns) > kMaxPrediction_s) state.track.twist.reset();
+  if (!recent) state.track.twist.reset();
   update_odometry(*input.map, before, outcome);
   if (!had_features(result)) return;
   if (state.frames_lost++ == 0) state.lost_since_ns = result.time_ns;

@@ -76,6 +76,7 @@ struct FrontEndState {
   bool keyframe_failed = false;
   int rig_checks = 0, rig_corrections = 0;  // before a map is started: frames since the last check, corrections so far
   int reduction = 0;                        // level of tracking/reduced_work.h
+  bool stalled = false;                     // the last frame had the images of an earlier one; see Tracker::stalled
   int frames_lost = 0;                      // consecutive lost frames with features
   TimeNs lost_since_ns = 0;                 // time of the first of them
   geometry::SE3 T_rig_odom, T_map_odom;
@@ -133,6 +134,12 @@ class Tracker {
   // Called before extraction. Readmits excluded cameras in `state` that were blurred in the last frame and are not any
   // more.
   FramePlan plan(const image::ImageBundle& images, const ImageFaults& faults, FrontEndState& state) const;
+
+  // Whether the images of a frame that repeats those of the frame before (`repeated`, see ImageFaults) are to be
+  // ignored. The landmarks moved in the images until then, and an image cannot stop in one frame: a driver delivers an
+  // earlier image again, or a video was converted to a higher frame rate. If the rig was at rest, the images are used:
+  // simulated ones have no noise, and a video coder may remove it.
+  bool stalled(const FrontEndState& state, bool repeated, const map::BundledMap& map) const;
 
   // Returns true if the next frame is to be tracked without features first.
   bool tracks_directly(const FrontEndState& state) const;

@@ -120,6 +120,31 @@ TEST_F(RigReport, DescribesTheCalibrationOfABag) {
   EXPECT_FALSE(report_rig({.file = bag.string()}));
 }
 
+// Frames with images of both cameras are chosen for the test, wherever they are.
+TEST_F(RigReport, TestsACameraThatHasFewImages) {
+  ThreadPool pool(2);
+  const simulator::SimulationRequest request{.folder = folder_ / "data",
+                                             .rig = synthetic::ring_rig(2, 240),
+                                             .recording = {.duration_s = 0.4, .rate_hz = 40},
+                                             .tour = {.duration_s = 0.4},
+                                             .imaging = {},
+                                             .world = {.texel = 0.03, .light_texel = 0.8, .ambient_rays = 2}};
+  ASSERT_TRUE(simulator::write_simulation(request, pool).ok());
+  std::vector<std::filesystem::path> images;
+  for (const auto& file : std::filesystem::recursive_directory_iterator(folder_ / "data/mav0/cam1")) {
+    if (file.path().extension() == ".png") images.push_back(file.path());
+  }
+  std::ranges::sort(images);
+  ASSERT_EQ(images.size(), 16u);
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    if (i != 5) std::filesystem::remove(images[i]);
+  }
+  const std::string data = (folder_ / "data").string();
+  const auto report = report_rig({.file = data, .images = data});
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_NE(report->find("the extrinsics are consistent with the images"), std::string::npos) << *report;
+}
+
 // The complete test: images, features, verdict.
 TEST_F(RigReport, TestsTheExtrinsicsAgainstImages) {
   ThreadPool pool(2);

@@ -91,6 +91,15 @@ TEST(CameraMonitor, DetectsAFrozenCameraButNotARigAtRest) {
   EXPECT_EQ(outages(monitor, {good(3), good(2)}), (Outages{CameraReason::kNone, CameraReason::kFrozen}));
 }
 
+TEST(CameraMonitor, NoticesThatAllImagesAreRepeated) {
+  CameraMonitor monitor(3, {});
+  EXPECT_FALSE(examine(monitor, {good(1), good(2), good(3)}).repeated);
+  EXPECT_TRUE(examine(monitor, {good(1), good(2), good(3)}).repeated);
+  EXPECT_TRUE(examine(monitor, {good(1), {}, good(3)}).repeated);
+  EXPECT_FALSE(examine(monitor, {good(1), good(2), good(4)}).repeated);
+  EXPECT_FALSE(examine(monitor, {{}, {}, {}}).repeated);
+}
+
 TEST(CameraMonitor, AFrozenCameraStaysFrozenIfTheOthersMissAFrame) {
   CameraMonitor monitor(2, {});
   outages(monitor, {good(1), good(2)});

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "tracking/camera_evidence.h"
+
 namespace bslam::tracking {
 namespace {
 
@@ -114,6 +116,21 @@ TEST(CameraStatus, ACameraWithHardlyAnyInliersIsInconsistent) {
   EXPECT_EQ(after(12, 5, 40), kGood);    // no other camera has a high inlier ratio
   EXPECT_EQ(after(5, 5, 200), kGood);    // too few frames
   EXPECT_EQ(after(12, 0, 0), kGood);     // lost
+}
+
+// A camera that overlaps no other one has no landmarks in view before the rig has moved.
+TEST(CameraStatus, ACameraIsNotInconsistentBeforeTheMapCanHaveLandmarksInItsView) {
+  for (const std::size_t keyframes : {1u, 3u, 4u}) {
+    CameraStatusMonitor monitor(2);
+    CameraStatus status;
+    for (int i = 0; i < 40; ++i) {
+      std::vector<CameraEvidence> evidence = {good(), good()};
+      evidence[1].inliers = 0;
+      leave_out_inliers_of_new_map(keyframes, evidence);
+      status = monitor.update(evidence)[1];
+    }
+    EXPECT_EQ(status, keyframes < 4 ? kGood : degraded(CameraReason::kInconsistent)) << keyframes;
+  }
 }
 
 TEST(CameraStatus, ACameraThatWasGoodForAnHourBecomesInconsistentWithinAMinute) {

@@ -53,6 +53,15 @@ TEST_F(CommandLine, ARunThatIsKilledLeavesTheEarlierResultsInAFolderOfTheirOwn) 
   EXPECT_FALSE(fs::exists(folder + "/earlier_results"));
 }
 
+TEST_F(CommandLine, EvalSaysIfItsFilesAreExchanged) {
+  const std::string truth = data() + "/groundtruth_cam0.tum", estimate = out("estimate.tum");
+  support::write_text(estimate, "# bslam trajectory frame=cam0 parent=world final=true\n" + read_text(truth));
+  const std::string note = "note: " + estimate + " was estimated by bslam, but is given as the ground truth";
+  EXPECT_NE(run("eval " + truth + " " + estimate).err.find(note), std::string::npos);
+  for (const std::string& files : {estimate + " " + truth, estimate + " " + estimate, truth + " " + truth})
+    EXPECT_EQ(run("eval " + files).err.find("note: "), std::string::npos) << files;
+}
+
 // The calibration and the trajectory exist, and are inputs.
 TEST_F(CommandLine, AnOutputReplacesNeitherItsInputNorAFileOfAnotherKind) {
   const std::string truth = out("truth.tum"), rig = out("mine.yaml"), notes = out("notes.svg");

@@ -1,0 +1,62 @@
+// Frames in which every camera delivers the image of the frame before again.
+#include <gtest/gtest.h>
+
+#include "system/rendered_tour.h"
+
+namespace bslam::system {
+namespace {
+
+using tracking::CameraReason;
+using tracking::LostReason;
+using tracking::TrackStatus;
+
+constexpr std::size_t kFirst = 12, kEnd = 24;  // frames with the images of the frame before kFirst
+
+void repeat(const image::ImageBundle& from, image::ImageBundle& to) {
+  for (std::size_t c = 0; c < to.images.size(); ++c) {
+    to.images[c].image = image::Image(from.images[c].image.width(), from.images[c].image.height());
+    for (int y = 0; y < to.images[c].image.height(); ++y)
+      std::copy_n(from.images[c].image.row(y), from.images[c].image.width(), to.images[c].image.row(y));
+  }
+}
+
+TEST(RepeatedImages, OfAMovingRigGiveNoPoseAndTrackingContinuesAfterThem) {
+  const RenderedTour tour(4, 40);
+  std::vector<image::ImageBundle> frames = tour.frames();
+  for (std::size_t k = kFirst; k < kEnd; ++k) repeat(frames[kFirst - 1], frames[k]);
+  System system(tour.rig(), small_config(execution::Mode::kSequential));
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    const FrameRecord record = must_process(system, frames[k]);
+    const bool stalled = k >= kFirst && k < kEnd;
+    EXPECT_EQ(record.result.status, stalled ? TrackStatus::kLost : TrackStatus::kTracking) << k;
+    if (!stalled) continue;
+    EXPECT_EQ(record.result.reason, LostReason::kNoImages) << k;
+    for (const tracking::CameraStatus& camera : record.cameras) EXPECT_EQ(camera.reason, CameraReason::kFrozen) << k;
+  }
+  system.finish();
+  EXPECT_LT(ate_m(final_poses(system), tour.truth()), 0.01);
+}
+
+// A video that was converted to twice its frame rate.
+TEST(RepeatedImages, EverySecondOneIsIgnored) {
+  const RenderedTour tour(2, 40);
+  std::vector<image::ImageBundle> frames = tour.frames();
+  for (std::size_t k = 1; k < frames.size(); k += 2) repeat(frames[k - 1], frames[k]);
+  System system(tour.rig(), small_config(execution::Mode::kSequential));
+  for (const image::ImageBundle& images : frames) must_process(system, images);
+  system.finish();
+  EXPECT_GE(tracked_frames(system), frames.size() / 2);
+  EXPECT_LT(ate_m(final_poses(system), tour.truth()), 0.01);
+}
+
+TEST(RepeatedImages, OfARigAtRestHavePoses) {
+  const RenderedTour tour(2, 20);
+  std::vector<image::ImageBundle> frames = tour.frames();
+  for (std::size_t k = 1; k < 10; ++k) repeat(frames[0], frames[k]);  // before the motion is known
+  System system(tour.rig(), small_config(execution::Mode::kSequential));
+  for (std::size_t k = 0; k < 10; ++k)
+    EXPECT_EQ(must_process(system, frames[k]).result.status, TrackStatus::kTracking) << k;
+}
+
+}  // namespace
+}  // namespace bslam::system
