@@ -24,6 +24,7 @@ Pipeline::Pipeline(const camera::Rig& rig, CamerasOfRun cameras, const Config& c
       pool_(config.execution.threads_for(cameras.size)),
       monitor_(rig.size(), config.health),
       status_(rig.size()),
+      overlapping_(tracking::overlapping_cameras(rig)),
       preparation_(rig, config, std::move(masks), pool_),
       tracker_(rig, tracker_options(config, cameras), pool_, std::move(relocaliser)),
       keyframe_maker_(keyframe_maker) {}
@@ -49,7 +50,7 @@ Pipeline::Outcome Pipeline::process(const image::ImageBundle& images, execution:
   record.stages.insert(record.stages.begin(), stages.begin(), stages.end());
   record.reduction = state_.reduction;
   auto evidence = tracking::camera_evidence(images, faults, plan.postponed, record, outcome.created_cameras);
-  tracking::leave_out_inliers_of_new_map(outcome.seen->num_keyframes(), evidence);
+  tracking::leave_out_inliers_of_new_map(outcome.seen->num_keyframes(), overlapping_, evidence);
   record.cameras = status_.update(evidence);
   for (const image::CameraImage& i : images.images) record.images.push_back(i.state);
   record.frame_ms = whole.ms();

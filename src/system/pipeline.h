@@ -74,6 +74,7 @@ class Pipeline {
   ThreadPool pool_;
   tracking::CameraMonitor monitor_;
   tracking::CameraStatusMonitor status_;
+  const std::vector<std::uint8_t> overlapping_;  // per camera: tracking::overlapping_cameras
   FramePreparation preparation_;
   tracking::Tracker tracker_;
   tracking::FrontEndState state_;

@@ -23,10 +23,23 @@ std::vector<CameraEvidence> camera_evidence(const image::ImageBundle& images, co
   return out;
 }
 
-void leave_out_inliers_of_new_map(std::size_t keyframes, std::vector<CameraEvidence>& evidence) {
-  constexpr std::size_t kFew = 4;
-  if (keyframes >= kFew) return;
-  for (CameraEvidence& camera : evidence) camera.keypoints = camera.inliers = 0;
+void leave_out_inliers_of_new_map(std::size_t keyframes, std::span<const std::uint8_t> overlapping,
+                                  std::vector<CameraEvidence>& evidence) {
+  if (keyframes > 1) return;
+  for (std::size_t c = 0; c < evidence.size(); ++c) {
+    if (!overlapping[c]) evidence[c].keypoints = evidence[c].inliers = 0;
+  }
+}
+
+std::vector<std::uint8_t> overlapping_cameras(const camera::Rig& rig) {
+  constexpr double kSome = 0.1;
+  std::vector<std::uint8_t> out(rig.size(), 0);
+  for (std::size_t c = 0; c < rig.size(); ++c) {
+    for (std::size_t other = 0; other < rig.size(); ++other) {
+      if (other != c && rig.overlap_share(c, other) >= kSome) out[c] = 1;
+    }
+  }
+  return out;
 }
 
 }  // namespace bslam::tracking

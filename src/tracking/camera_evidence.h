@@ -18,8 +18,13 @@ std::vector<CameraEvidence> camera_evidence(const image::ImageBundle& images, co
                                             std::span<const std::uint8_t> postponed, const FrameRecord& record,
                                             std::span<const CameraCounts> created);
 
-// Leaves the numbers of inliers out while the map has few keyframes: landmarks in the view of a camera that overlaps no
-// other one are created from several keyframes of a moving rig, and without them none of its keypoints can agree.
-void leave_out_inliers_of_new_map(std::size_t keyframes, std::vector<CameraEvidence>& evidence);
+// Leaves the numbers of inliers of cameras that hardly overlap another one out before the map has a second keyframe:
+// landmarks in their view are created from keyframes of a moving rig, and without landmarks none of their keypoints can
+// agree. `overlapping`: one flag per camera.
+void leave_out_inliers_of_new_map(std::size_t keyframes, std::span<const std::uint8_t> overlapping,
+                                  std::vector<CameraEvidence>& evidence);
+
+// The flags of the function above.
+std::vector<std::uint8_t> overlapping_cameras(const camera::Rig& rig);
 
 }  // namespace bslam::tracking

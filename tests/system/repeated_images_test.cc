@@ -37,11 +37,11 @@ TEST(RepeatedImages, OfAMovingRigGiveNoPoseAndTrackingContinuesAfterThem) {
   EXPECT_LT(ate_m(final_poses(system), tour.truth()), 0.01);
 }
 
-// A video that was converted to twice its frame rate.
+// A video that was converted to twice its frame rate, after some frames from which the motion is known.
 TEST(RepeatedImages, EverySecondOneIsIgnored) {
   const RenderedTour tour(2, 40);
   std::vector<image::ImageBundle> frames = tour.frames();
-  for (std::size_t k = 1; k < frames.size(); k += 2) repeat(frames[k - 1], frames[k]);
+  for (std::size_t k = 5; k < frames.size(); k += 2) repeat(frames[k - 1], frames[k]);
   System system(tour.rig(), small_config(execution::Mode::kSequential));
   for (const image::ImageBundle& images : frames) must_process(system, images);
   system.finish();

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "synthetic/rigs.h"
 #include "tracking/camera_evidence.h"
 
 namespace bslam::tracking {
@@ -120,17 +121,25 @@ TEST(CameraStatus, ACameraWithHardlyAnyInliersIsInconsistent) {
 
 // A camera that overlaps no other one has no landmarks in view before the rig has moved.
 TEST(CameraStatus, ACameraIsNotInconsistentBeforeTheMapCanHaveLandmarksInItsView) {
-  for (const std::size_t keyframes : {1u, 3u, 4u}) {
-    CameraStatusMonitor monitor(2);
-    CameraStatus status;
-    for (int i = 0; i < 40; ++i) {
-      std::vector<CameraEvidence> evidence = {good(), good()};
-      evidence[1].inliers = 0;
-      leave_out_inliers_of_new_map(keyframes, evidence);
-      status = monitor.update(evidence)[1];
+  for (const bool overlaps : {false, true}) {
+    for (const std::size_t keyframes : {1u, 2u}) {
+      const std::vector<std::uint8_t> overlapping = {1, overlaps};
+      CameraStatusMonitor monitor(2);
+      CameraStatus status;
+      for (int i = 0; i < 40; ++i) {
+        std::vector<CameraEvidence> evidence = {good(), good()};
+        evidence[1].inliers = 0;
+        leave_out_inliers_of_new_map(keyframes, overlapping, evidence);
+        status = monitor.update(evidence)[1];
+      }
+      EXPECT_EQ(status, !overlaps && keyframes < 2 ? kGood : degraded(CameraReason::kInconsistent)) << keyframes;
     }
-    EXPECT_EQ(status, keyframes < 4 ? kGood : degraded(CameraReason::kInconsistent)) << keyframes;
   }
+}
+
+TEST(CameraStatus, CamerasOverlapIfTheyShareATenthOfAView) {
+  EXPECT_EQ(overlapping_cameras(synthetic::ring_rig(1)), std::vector<std::uint8_t>{0});
+  EXPECT_EQ(overlapping_cameras(synthetic::ring_rig(2)), (std::vector<std::uint8_t>{1, 1}));
 }
 
 TEST(CameraStatus, ACameraThatWasGoodForAnHourBecomesInconsistentWithinAMinute) {
