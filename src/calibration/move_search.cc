@@ -84,45 +84,63 @@ bool same_moves(const std::vector<camera::CameraMove>& a, const std::vector<came
   return std::ranges::equal(a, b, {}, place, place);
 }
 
-// Estimates the calibration with these moves at the times that fit best.
-RigEstimate estimate_at_best_times(const EstimateInput& input, const RigAdjustmentOptions& prior,
-                                   MovedCameras cameras) {
-  RigEstimate out = estimate_rig(input, prior, std::move(cameras));
-  for (int i = 0; i < kMaxCorrections && out.adjusted.done; ++i) {
-    auto moves = out.cameras.at_best_times(input.map, out.problem, out.adjusted.values);
-    if (same_moves(moves, out.cameras.moves())) break;
-    out = estimate_rig(input, prior, {input.map.rig().size(), std::move(moves)});
-  }
-  return out;
-}
+// Estimates with moves. If moves are not the reason for what the images show, such as jitter of the time stamps, every
+// further one is different, and the search ends after a number of estimates.
+class MoveSearch {
+ public:
+  explicit MoveSearch(const EstimateInput& input) : input_(input) {}
 
-// Estimates the calibration with those of these moves that are significant. Without one of them, the others are
-// different.
-RigEstimate estimate_significant_moves(const EstimateInput& input, const RigAdjustmentOptions& prior,
-                                       MovedCameras cameras) {
-  RigEstimate out = estimate_at_best_times(input, prior, std::move(cameras));
-  while (out.adjusted.done) {
-    const std::vector<MoveEstimate> moves = moves_of(out);
-    std::vector<camera::CameraMove> kept;
-    for (std::size_t m = 0; m < moves.size(); ++m) {
-      if (significant(moves[m])) kept.push_back(out.cameras.moves()[m]);
+  bool exhausted() const { return estimates_ >= kMaxEstimates; }
+
+  // Estimates the calibration with those of these moves that are significant, at the times that fit best. Without one
+  // of them, the others are different.
+  RigEstimate estimate_significant_moves(const RigAdjustmentOptions& prior, MovedCameras cameras) {
+    RigEstimate out = estimate_at_best_times(prior, std::move(cameras));
+    while (out.adjusted.done && !exhausted()) {
+      const std::vector<MoveEstimate> moves = moves_of(out);
+      std::vector<camera::CameraMove> kept;
+      for (std::size_t m = 0; m < moves.size(); ++m) {
+        if (significant(moves[m])) kept.push_back(out.cameras.moves()[m]);
+      }
+      if (kept.size() == out.cameras.moves().size()) break;
+      MovedCameras fewer(input_.map.rig().size(), std::move(kept));
+      const RigAdjustmentOptions prior_of_fewer = prior_with_timing(input_, fewer);
+      out = estimate_at_best_times(prior_of_fewer, std::move(fewer));
     }
-    if (kept.size() == out.cameras.moves().size()) break;
-    MovedCameras fewer(input.map.rig().size(), std::move(kept));
-    const RigAdjustmentOptions prior_of_fewer = prior_with_timing(input, fewer);
-    out = estimate_at_best_times(input, prior_of_fewer, std::move(fewer));
+    return out;
   }
-  return out;
-}
 
-// Estimates the calibration with a further move.
-RigEstimate estimate_with(const EstimateInput& input, const RigEstimate& before, const PossibleMove& move) {
-  const KeyframeId first = before.problem.selected.keyframes[move.pose];
-  MovedCameras more = before.cameras.with_move(before.adjusted.values, move, input.map.keyframe(first).frame->time_ns);
-  // The effect of the move may have looked like wrong times, which are tested again.
-  const RigAdjustmentOptions prior = prior_with_timing(input, more);
-  return estimate_significant_moves(input, prior, std::move(more));
-}
+  // Estimates the calibration with a further move.
+  RigEstimate estimate_with(const RigEstimate& before, const PossibleMove& move) {
+    const KeyframeId first = before.problem.selected.keyframes[move.pose];
+    MovedCameras more =
+        before.cameras.with_move(before.adjusted.values, move, input_.map.keyframe(first).frame->time_ns);
+    // The effect of the move may have looked like wrong times, which are tested again.
+    const RigAdjustmentOptions prior = prior_with_timing(input_, more);
+    return estimate_significant_moves(prior, std::move(more));
+  }
+
+ private:
+  static constexpr int kMaxEstimates = 16;  // three moves of one recording need about ten
+
+  RigEstimate estimate(const RigAdjustmentOptions& prior, MovedCameras cameras) {
+    ++estimates_;
+    return estimate_rig(input_, prior, std::move(cameras));
+  }
+
+  RigEstimate estimate_at_best_times(const RigAdjustmentOptions& prior, MovedCameras cameras) {
+    RigEstimate out = estimate(prior, std::move(cameras));
+    for (int i = 0; i < kMaxCorrections && out.adjusted.done && !exhausted(); ++i) {
+      auto moves = out.cameras.at_best_times(input_.map, out.problem, out.adjusted.values);
+      if (same_moves(moves, out.cameras.moves())) break;
+      out = estimate(prior, {input_.map.rig().size(), std::move(moves)});
+    }
+    return out;
+  }
+
+  const EstimateInput& input_;
+  int estimates_ = 0;
+};
 
 }  // namespace
 
@@ -137,8 +155,9 @@ std::vector<MoveEstimate> moves_of(const RigEstimate& estimate) {
 
 RigEstimate estimate_rig_and_moves(const EstimateInput& input, const RigAdjustmentOptions& prior,
                                    MovedCameras cameras) {
+  MoveSearch search(input);
   RigEstimate known = cameras.moves().empty() ? estimate_rig(input, prior, std::move(cameras))
-                                              : estimate_significant_moves(input, prior, std::move(cameras));
+                                              : search.estimate_significant_moves(prior, std::move(cameras));
   // The first moves that are found may be at wrong times and be replaced by others.
   std::optional<RigEstimate> latest;
   std::vector<std::size_t> dropped;  // cameras of the latest problem
@@ -146,8 +165,8 @@ RigEstimate estimate_rig_and_moves(const EstimateInput& input, const RigAdjustme
     const RigEstimate& before = latest ? *latest : known;
     const auto move = likely_move(input, before, dropped);
     if (!move) break;
-    if (found == kMaxMoves) return known;  // something else than moves
-    RigEstimate next = estimate_with(input, before, *move);
+    if (found == kMaxMoves || search.exhausted()) return known;  // something else than moves
+    RigEstimate next = search.estimate_with(before, *move);
     if (next.adjusted.done && !same_moves(next.cameras.moves(), before.cameras.moves())) {
       latest = std::move(next);
       dropped.clear();

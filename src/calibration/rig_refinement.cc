@@ -98,6 +98,16 @@ void evaluate_scale(const EstimateInput& input, const RigEstimate& estimate, Rig
     out.scale_deviation = path_deviation(estimate.problem, estimate.adjusted.pose_effects) / estimate.path_before;
 }
 
+// The images do not constrain the position of a camera that was nevertheless displaced by far more than calibrations
+// are wrong. Their errors are not those of a calibration, but those of time stamps that jitter, for example.
+bool is_implausible(const std::vector<CameraRefinement>& cameras, const camera::Rig& calibrated) {
+  constexpr double kMaxOfBaseline = 0.1;
+  const double limit_mm = kMaxOfBaseline * kMillimetresPerMetre * longest_baseline(calibrated);
+  return std::ranges::any_of(cameras, [&](const CameraRefinement& camera) {
+    return camera.change_mm > limit_mm && !camera.translation_observed();
+  });
+}
+
 RigRefinement evaluate(const EstimateInput& input, RigEstimate&& estimate) {
   RigRefinement out;
   RigAdjustment& adjusted = estimate.adjusted;
@@ -120,6 +130,7 @@ RigRefinement evaluate(const EstimateInput& input, RigEstimate&& estimate) {
     if (c > 0) evaluate_extrinsics(adjusted.cameras[c], input.options, camera);
     evaluate_timing(adjusted.cameras[c], camera);
   }
+  out.implausible = is_implausible(out.cameras, input.calibrated);
   out.moves = moves_of(estimate);
   out.excess_error = adjusted.excess_error;
   out.verdict = out.excess_error > input.options.inconsistent_excess ? Verdict::kInconsistent : Verdict::kConsistent;
@@ -151,7 +162,7 @@ Eigen::MatrixXd prior_information(const camera::Rig& calibrated, const Calibrati
 }
 
 bool accepted(const RigRefinement& refinement, const CalibrationOptions& options) {
-  if (!refinement.done || options.refine == Refine::kFalse) return false;
+  if (!refinement.done || refinement.implausible || options.refine == Refine::kFalse) return false;
   return options.refine == Refine::kTrue || refinement.verdict == Verdict::kInconsistent;
 }
 

@@ -159,7 +159,8 @@ struct MoveEstimate {
 };
 
 struct RigRefinement {
-  bool done = false;  // false: one camera only, no metric scale, too few observations, stopped or failed
+  bool done = false;         // false: one camera only, no metric scale, too few observations, stopped or failed
+  bool implausible = false;  // some camera was displaced by much that the images do not constrain; never accepted
   std::vector<CameraRefinement> cameras;     // all cameras in the order of the rig, if done
   std::vector<MoveEstimate> moves;           // in order of time; the extrinsics in `cameras` are those before them
   std::size_t keyframes = 0, landmarks = 0;  // numbers of keyframes and landmarks used

@@ -12,7 +12,7 @@ FrameOutcome RunFrame::outcome() const {
 }
 
 void CalibrationRecord::accept_estimate(bool complete, bool replaced) {
-  applies = complete && estimate.done && pairs.empty() && disagreeing.empty() && !late;
+  applies = complete && estimate.done && !estimate.implausible && pairs.empty() && disagreeing.empty() && !late;
   refined = applies && replaced;
 }
 
