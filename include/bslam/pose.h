@@ -27,7 +27,7 @@ using Covariance6 = std::array<double, 36>;
 
 struct BSLAM_EXPORT Pose {
   std::array<double, 4> rotation = {0, 0, 0, 1};  // unit quaternion x, y, z, w (Hamilton): orientation of b in a
-  std::array<double, 3> translation = {0, 0, 0};  // metres: origin of b in a
+  std::array<double, 3> translation = {0, 0, 0};  // origin of b in a; metres, or map units if the scale is not metric
 
   Matrix4 matrix() const;
   Pose inverse() const;  // T_b_a
@@ -39,7 +39,8 @@ struct BSLAM_EXPORT Pose {
 BSLAM_EXPORT Pose operator*(const Pose& T_a_b, const Pose& T_b_c);
 BSLAM_EXPORT std::array<double, 3> operator*(const Pose& T_a_b, const std::array<double, 3>& point_b);
 
-// Velocity of a frame relative to the world, in the axes of that frame (like the twist in the child frame of ROS).
+// Velocity of a frame relative to the world, in the axes of that frame (as the twist of nav_msgs/Odometry in
+// child_frame_id).
 struct Velocity {
   std::array<double, 3> angular = {0, 0, 0};  // rad/s
   std::array<double, 3> linear = {0, 0, 0};   // m/s, velocity of the frame's origin

@@ -16,7 +16,7 @@
 namespace bslam {
 
 namespace api {
-struct Access;  // access of the library to the implementations
+struct Access;  // gives the library access to the implementations
 }
 
 // Calibration of one camera. The camera frame has z forward, x to the right and y down; the centre of the upper left
@@ -42,7 +42,7 @@ struct CameraCalibration {
 // Immutable; copies are cheap and may be used from any thread.
 class BSLAM_EXPORT Rig {
  public:
-  Rig(const Rig& other) = default;  // a move copies as well, so that a Rig always has cameras
+  Rig(const Rig& other) = default;  // moving copies as well, so that a Rig always has cameras
   Rig& operator=(const Rig& other) = default;
 
   // Reads a calibration of any known format, recognised by its content: bslam, EuRoC, Kalibr, OpenVINS, ORB-SLAM3,
@@ -51,8 +51,8 @@ class BSLAM_EXPORT Rig {
   // camera's resolution.
   static Result<Rig> load(const std::filesystem::path& file);
 
-  // Creates a rig from calibrations; the first one is camera 0. Errors: no camera; two cameras of one name; as for
-  // `load`, values out of range, with the name of the camera and the parameter.
+  // Creates a rig from calibrations; the first one is camera 0. Errors: no camera; two cameras with the same name; as
+  // for `load`, values out of range, with the name of the camera and the parameter.
   static Result<Rig> make(const std::vector<CameraCalibration>& cameras);
 
   // Returns the rig of the given cameras, in this order; the first one becomes camera 0. Errors: no index, a repeated

@@ -37,7 +37,8 @@ void* allocated(const Allocate& allocate) {
 }
 [[gnu::noinline]] void* operator new(std::size_t size, std::align_val_t alignment) {
   const auto align = static_cast<std::size_t>(alignment);
-  const std::size_t whole = (size + align - 1) / align * align;  // std::aligned_alloc takes multiples only
+  const std::size_t whole =
+      (size + align - 1) / align * align;  // std::aligned_alloc requires a multiple of the alignment
   return allocated([size, whole, align]() -> void* {
     return whole < size ? nullptr : std::aligned_alloc(align, whole > 0 ? whole : align);
   });

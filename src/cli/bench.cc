@@ -105,7 +105,7 @@ benchmark::BenchmarkConditions conditions_of(const BenchArguments& a, bool loops
 }
 
 // Returns true if two runs in a deterministic mode gave the same poses. Then their seeds had no effect: random numbers
-// are only drawn for monocular initialisation, and if tracking is difficult or lost.
+// are only drawn for monocular initialisation, if tracking is difficult or lost, and to verify recognised places.
 bool are_copies(const BenchArguments& a, const Sequence& sequence, execution::Mode mode) {
   if (mode == execution::Mode::kParallel) return false;
   const auto trajectory = [&](const char* run) {

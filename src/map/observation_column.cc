@@ -13,7 +13,8 @@ void ObservationColumn::push_back(std::uint64_t tag) {
 
 void ObservationColumn::append(std::span<const std::uint32_t> counts, std::span<const Observation> observations,
                                std::uint64_t tag) {
-  BSLAM_ASSERT(size_ % kBlock == 0 && counts.size() <= kBlock, "whole blocks must be appended to whole blocks");
+  BSLAM_ASSERT(size_ % kBlock == 0 && counts.size() <= kBlock,
+               "the last block must be full before another one is appended");
   Block block;
   for (std::size_t r = 0; r < kBlock; ++r) block.begin[r + 1] = block.begin[r] + (r < counts.size() ? counts[r] : 0);
   block.entries.assign(observations.begin(), observations.end());

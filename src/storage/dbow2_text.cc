@@ -104,7 +104,7 @@ Result<TextNode> parse_node(std::string_view text, std::size_t line, const Shape
   if (above.children == shape.branching)
     return at_line(line, "too many children of one parent", "at most " + std::to_string(shape.branching));
   if (above.level == shape.levels)
-    return at_line(line, "a node on a too deep level", "at most " + std::to_string(shape.levels));
+    return at_line(line, "a node below the deepest level", "at most " + std::to_string(shape.levels));
   const auto is_leaf = number<int>(words.next(), 0, 1);
   if (!is_leaf) return at_line(line, "an invalid is_leaf", "0 or 1");
   for (std::size_t i = 0; i < kBytes; ++i) {

@@ -122,6 +122,22 @@ TEST(RunWarnings, WithALateCameraNoEstimateIsOffered) {
   EXPECT_FALSE(has_text(warnings, "calibration.refine=true"));
 }
 
+TEST(RunWarnings, AnImplausibleEstimateIsNotOffered) {
+  RunRecord record;
+  record.cameras.resize(2);
+  record.calibration.estimate.done = true;
+  record.calibration.estimate.verdict = calibration::Verdict::kInconsistent;
+  record.calibration.accept_estimate(true, true);
+  EXPECT_TRUE(record.calibration.applies && record.calibration.refined);
+  record.calibration.estimate.implausible = true;
+  record.calibration.accept_estimate(true, false);
+  EXPECT_FALSE(record.calibration.applies || record.calibration.refined);
+  EXPECT_FALSE(calibration::accepted(record.calibration.estimate, {.refine = calibration::Refine::kTrue}));
+  const std::vector<std::string> warnings = warnings_after_run(record, synthetic::default_rig(), "");
+  EXPECT_TRUE(has_text(warnings, "the estimate cannot be used for other recordings"));
+  EXPECT_FALSE(has_text(warnings, "calibration.refine="));
+}
+
 TEST(RunWarnings, MirroredImagesAreNamed) {
   RunRecord record;
   record.cameras.resize(2);
