@@ -86,10 +86,10 @@ bool before_first_calibration(KeyframeId keyframe, const map::BundledMap& map);
 bool awaited(const StageTask& task, const map::BundledMap& newest);
 
 // The stages whose waiting and running tasks are dropped when a result of `stage` is committed; `newest` is the newest
-// version before the commit. After a loop closure or a calibration, a global adjustment of an earlier version is
-// useless; they adjust the map themselves or another adjustment follows. A loop closure also supersedes a calibration
-// of an earlier version if it moves the map and does not merely fuse landmarks. Returns none if nothing will be
-// committed.
+// version before the commit, or the base of the result if they are dropped only once it was committed. After a loop
+// closure or a calibration, a global adjustment of an earlier version is useless; they adjust the map themselves or
+// another adjustment follows. A loop closure also supersedes a calibration of an earlier version if it moves the map
+// and does not merely fuse landmarks. Returns none if nothing will be committed.
 std::vector<Stage> superseded_by(Stage stage, const StageResult& result, const map::BundledMap& newest);
 
 // Whether tasks of a stage can be dropped because of a result of another stage; a dropped task leaves no entry in the

@@ -135,10 +135,10 @@ bool track_in_wide_windows(const TrackInput& input, const std::vector<LandmarkId
 }
 
 // Whether several cameras, and no fewer than are left, were excluded in this frame.
-bool half_excluded(const Coarse& coarse, const std::vector<std::uint8_t>& before, int min_expected) {
+bool half_excluded(const Coarse& coarse, int min_expected) {
   int excluded = 0, checked = 0;
   for (std::size_t c = 0; c < coarse.reobserved.size(); ++c) {
-    if (before[c] || coarse.reobserved[c].expected < min_expected) continue;
+    if (coarse.reobserved[c].expected < min_expected) continue;  // also of a camera that was excluded before
     ++checked;
     excluded += coarse.excluded[c];
   }
@@ -152,8 +152,8 @@ bool half_excluded(const Coarse& coarse, const std::vector<std::uint8_t>& before
 Coarse track_last_frame(const TrackInput& input, const frame::BundledFrame& frame, const TrackingOptions& options,
                         ThreadPool& pool) {
   const std::vector<LandmarkId> landmarks = last_landmarks(input.map, input.state);
-  const std::vector<std::uint8_t> before = excluded(input.state, input.map.rig().size());
-  Coarse out{frame, predict(input, frame.time_ns), {}, LostReason::kFewMatches, before};
+  Coarse out{
+      frame, predict(input, frame.time_ns), {}, LostReason::kFewMatches, excluded(input.state, input.map.rig().size())};
   const bool tracking = input.state.status == TrackStatus::kTracking;
   const bool predicted = tracking && motion_since_last(input.state, frame.time_ns);
   if (predicted && track_in_narrow_windows(input, landmarks, options, pool, out)) return out;
@@ -163,7 +163,7 @@ Coarse track_last_frame(const TrackInput& input, const frame::BundledFrame& fram
     found = track_in_wide_windows(input, landmarks, options, pool, out);
   }
   if (tracking && (found || !predicted)) track_in_narrow_windows(input, landmarks, options, pool, out);
-  if (half_excluded(out, before, options.consensus.min_expected)) out.reason = LostReason::kUnstablePose;
+  if (half_excluded(out, options.consensus.min_expected)) out.reason = LostReason::kUnstablePose;
   return out;
 }
 

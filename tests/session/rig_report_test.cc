@@ -120,16 +120,21 @@ TEST_F(RigReport, DescribesTheCalibrationOfABag) {
   EXPECT_FALSE(report_rig({.file = bag.string()}));
 }
 
-// Frames with images of both cameras are chosen for the test, wherever they are.
-TEST_F(RigReport, TestsACameraThatHasFewImages) {
+// Renders 0.4 s of two cameras that look ahead.
+auto render_pair(const std::filesystem::path& folder, double rate_hz) {
   ThreadPool pool(2);
-  const simulator::SimulationRequest request{.folder = folder_ / "data",
+  const simulator::SimulationRequest request{.folder = folder,
                                              .rig = synthetic::ring_rig(2, 240),
-                                             .recording = {.duration_s = 0.4, .rate_hz = 40},
+                                             .recording = {.duration_s = 0.4, .rate_hz = rate_hz},
                                              .tour = {.duration_s = 0.4},
                                              .imaging = {},
                                              .world = {.texel = 0.03, .light_texel = 0.8, .ambient_rays = 2}};
-  ASSERT_TRUE(simulator::write_simulation(request, pool).ok());
+  return simulator::write_simulation(request, pool);
+}
+
+// Frames with images of both cameras are chosen for the test, wherever they are.
+TEST_F(RigReport, TestsACameraThatHasFewImages) {
+  ASSERT_TRUE(render_pair(folder_ / "data", 40).ok());
   std::vector<std::filesystem::path> images;
   for (const auto& file : std::filesystem::recursive_directory_iterator(folder_ / "data/mav0/cam1")) {
     if (file.path().extension() == ".png") images.push_back(file.path());
@@ -146,14 +151,7 @@ TEST_F(RigReport, TestsACameraThatHasFewImages) {
 
 // The complete test: images, features, verdict.
 TEST_F(RigReport, TestsTheExtrinsicsAgainstImages) {
-  ThreadPool pool(2);
-  const simulator::SimulationRequest request{.folder = folder_ / "data",
-                                             .rig = synthetic::ring_rig(2, 240),
-                                             .recording = {.duration_s = 0.4, .rate_hz = 10},
-                                             .tour = {.duration_s = 0.4},
-                                             .imaging = {},
-                                             .world = {.texel = 0.03, .light_texel = 0.8, .ambient_rays = 2}};
-  ASSERT_TRUE(simulator::write_simulation(request, pool).ok());
+  ASSERT_TRUE(render_pair(folder_ / "data", 10).ok());
   const std::string images = (folder_ / "data").string();
   const auto good = report_rig({.file = images, .images = images});
   ASSERT_TRUE(good) << good.error().message();

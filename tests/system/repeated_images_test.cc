@@ -13,11 +13,7 @@ using tracking::TrackStatus;
 constexpr std::size_t kFirst = 12, kEnd = 24;  // frames with the images of the frame before kFirst
 
 void repeat(const image::ImageBundle& from, image::ImageBundle& to) {
-  for (std::size_t c = 0; c < to.images.size(); ++c) {
-    to.images[c].image = image::Image(from.images[c].image.width(), from.images[c].image.height());
-    for (int y = 0; y < to.images[c].image.height(); ++y)
-      std::copy_n(from.images[c].image.row(y), from.images[c].image.width(), to.images[c].image.row(y));
-  }
+  for (std::size_t c = 0; c < to.images.size(); ++c) to.images[c].image = image::copy_of(from.images[c].image.view());
 }
 
 TEST(RepeatedImages, OfAMovingRigGiveNoPoseAndTrackingContinuesAfterThem) {
