@@ -1,35 +1,19 @@
 #include "calibration/moved_camera.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <utility>
 
-#include "camera/rolling_shutter.h"
+#include "calibration/image_equations.h"
 
 namespace bslam::calibration {
 namespace {
 
-using geometry::Matrix6d;
 using geometry::SE3;
 using geometry::Vector6d;
 
-constexpr int kMinObservations = 20, kMinKeyframes = 3;  // before and after a move: keyframes with so many observations
+constexpr int kMinKeyframes = 3;                             // with enough observations, before and after a move
 constexpr double kMaxUsedChi2 = 16 * solver::kChi2TwoDof95;  // of observations that are used
-
-// Normal equations of the extrinsics of a camera.
-struct Equations {
-  Matrix6d H = Matrix6d::Zero();
-  Vector6d b = Vector6d::Zero();
-  int observations = 0, keyframes = 0;
-
-  void add_keyframe(const Equations& other) {
-    H += other.H;
-    b += other.b;
-    keyframes += other.observations >= kMinObservations;
-  }
-};
 
 using Observation = solver::ReprojectionProblem::Observation;
 
@@ -51,44 +35,8 @@ double cost(const solver::ReprojectionProblem& problem, const solver::RigValues&
   return solver::huber_cost(std::min(chi2, kMaxUsedChi2));
 }
 
-// Adds an observation to the equations of its camera in its keyframe.
-void add(const solver::ReprojectionProblem& problem, const solver::RigValues& values, const Observation& o,
-         Equations& sums) {
-  const std::size_t c = o.camera.index();
-  const Eigen::Vector3d point = point_in_camera(problem, values, o, c);
-  const auto residual = solver::residual(values.models[c], point, o.pixel.cast<double>());
-  if (!residual) return;
-  const double inverse_sigma = 1.0 / static_cast<double>(o.sigma);
-  const Eigen::Vector2d e = inverse_sigma * residual->error;
-  const double chi2 = e.squaredNorm();
-  if (!(chi2 < kMaxUsedChi2)) return;
-  const solver::Matrix62d Jt = solver::pose_jacobian_transposed(inverse_sigma * residual->J, point);
-  const double weight = solver::huber_weight(chi2);
-  sums.H += weight * Jt * Jt.transpose();
-  sums.b += weight * Jt * e;
-  ++sums.observations;
-}
-
-// The change of the extrinsics of the part `after` relative to the rest that decreases the cost most, and twice that
-// decrease.
-std::pair<Vector6d, double> best_change(const Equations& all, const Equations& after) {
-  const Eigen::LDLT<Matrix6d> factor(all.H);
-  const Matrix6d information = after.H - after.H * factor.solve(after.H);
-  const Vector6d b = after.b - after.H * factor.solve(all.b);
-  const Vector6d change = information.ldlt().solve(b);
-  return {change, b.dot(change)};
-}
-
 TimeNs time_of(const map::BundledMap& map, const RigProblem& problem, std::size_t pose) {
   return map.keyframe(problem.selected.keyframes[pose]).frame->time_ns;
-}
-
-// The poses of the problem in order of time, which is not always that of their creation.
-std::vector<std::size_t> poses_by_time(const map::BundledMap& map, const RigProblem& problem) {
-  std::vector<std::size_t> out(problem.selected.keyframes.size());
-  std::iota(out.begin(), out.end(), 0);
-  std::ranges::stable_sort(out, {}, [&](std::size_t pose) { return time_of(map, problem, pose); });
-  return out;
 }
 
 }  // namespace
@@ -203,19 +151,17 @@ std::vector<PossibleMove> MovedCameras::likely_moves(const map::BundledMap& map,
                                                      const solver::RigValues& values, TimeNs from) const {
   const std::size_t cameras = values.T_cam_rig.size();
   const std::vector<std::size_t> poses = poses_by_time(map, problem);
-  std::vector<Equations> equations(poses.size() * cameras);
-  for (const auto& o : problem.selected.problem.observations)
-    add(problem.selected.problem, values, o, equations[static_cast<std::size_t>(o.pose) * cameras + o.camera.index()]);
+  const std::vector<ImageEquations> equations = image_equations(problem, values);
   std::vector<PossibleMove> out;
   // Of two cameras, the images show the relative extrinsics only.
   for (std::size_t c = cameras_ == 2 ? 1 : 0; c < cameras; ++c) {
-    Equations all, after;
+    ImageEquations all, after;
     PossibleMove best{.camera = c};
-    for (const std::size_t pose : poses) all.add_keyframe(equations[pose * cameras + c]);
+    for (const std::size_t pose : poses) all.add(equations[pose * cameras + c]);
     for (std::size_t i = poses.size(); i-- > 1;) {
       const std::size_t pose = poses[i];
       if (time_of(map, problem, pose) < from) break;
-      after.add_keyframe(equations[pose * cameras + c]);
+      after.add(equations[pose * cameras + c]);
       if (std::min(after.keyframes, all.keyframes - after.keyframes) < kMinKeyframes) continue;
       const auto [change, chi2] = best_change(all, after);
       if (std::isfinite(chi2) && chi2 > best.chi2) best = {c, pose, change, chi2};

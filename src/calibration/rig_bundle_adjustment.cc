@@ -104,8 +104,17 @@ double redundancy(const solver::BundleStructure& structure, int rig_unknowns) {
 }
 
 // Mean squared error over its expectation for the truncated distribution, corrected for the number of unknowns.
-double variance_factor(const solver::BundleStructure& structure, int rig_unknowns, double cost) {
-  return 2.0 * cost / (redundancy(structure, rig_unknowns) * solver::kVarianceLeft / solver::kFractionLeft);
+double variance_factor(double redundancy, double cost) {
+  return 2.0 * cost / (redundancy * solver::kVarianceLeft / solver::kFractionLeft);
+}
+
+// Relative increase of the mean squared error if the calibration were constant, less the increase that is to be
+// expected if it is right, because its estimate fits the errors of the images. `information`: with the prior.
+double excess_error(const Eigen::VectorXd& change, const Eigen::MatrixXd& information, const Eigen::MatrixXd& of_images,
+                    double correlated_observations, double redundancy, double cost) {
+  const Eigen::MatrixXd shrinkage = information.ldlt().solve(of_images);
+  const double by_noise = correlated_observations * (shrinkage * shrinkage).trace() / redundancy;
+  return std::max(0.0, change.dot(of_images * change) / std::max(1.0, 2.0 * cost) - by_noise);
 }
 
 void report_extrinsics(const Eigen::MatrixXd& covariance, const solver::ExtrinsicPrior& prior, RigAdjustment& out) {
@@ -222,7 +231,7 @@ std::vector<geometry::PoseUncertainty::Effect> effects_on_poses(const Eigen::Mat
 // Computes covariances and observed degrees of freedom at the current values. Returns false if the information is
 // singular.
 bool assess(solver::BundleEquations& equations, const CalibrationBlocks& blocks, const solver::RigValues& calibrated,
-            const RigAdjustmentOptions& options, RigAdjustment& out) {
+            const RigAdjustmentOptions& options, double redundancy, RigAdjustment& out) {
   equations.linearise();
   const auto information = equations.rig_information();
   if (!information) return false;
@@ -244,8 +253,8 @@ bool assess(solver::BundleEquations& equations, const CalibrationBlocks& blocks,
     report_timing(covariance.diagonal().tail(blocks.timing->size()).cwiseSqrt(), options, out);
   out.information =
       in_physical_units(without_timing(scale * of_images + prior, blocks), without_timing(prior, blocks), options, out);
-  const Eigen::VectorXd change = change_of(out, blocks);
-  out.excess_error = change.dot(of_images * change) / std::max(1.0, 2.0 * out.final_cost);
+  out.excess_error = excess_error(change_of(out, blocks), *information, of_images, options.correlated_observations,
+                                  redundancy, out.final_cost);
   return true;
 }
 
@@ -288,12 +297,13 @@ bool run_round(const solver::ReprojectionProblem& problem, const Round& round, c
   if (!summary.usable() || stop.stop_requested()) return false;
   if (last) {
     out.final_cost = summary.final_cost;
-    out.variance_factor = variance_factor(structure, blocks.size, summary.final_cost);
+    const double redundant = redundancy(structure, blocks.size);
+    out.variance_factor = variance_factor(redundant, summary.final_cost);
     out.values = equations.state().rig;
     for (std::size_t c = 0; c < out.cameras.size(); ++c)
       out.cameras[c].change = solver::extrinsic_change(out.values.T_cam_rig[c], calibrated.T_cam_rig[c]);
     for (const auto& term : structure.terms) ++out.cameras[static_cast<std::size_t>(term.camera)].observations;
-    out.done = assess(equations, blocks, calibrated, options, out);
+    out.done = assess(equations, blocks, calibrated, options, redundant, out);
   }
   state = std::move(equations.state());
   return true;

@@ -5,6 +5,7 @@
 
 #include "adjustment/landmark_noise.h"
 #include "calibration/calibration_prior.h"
+#include "calibration/image_equations.h"
 #include "calibration/lost_observations.h"
 #include "calibration/path_scale.h"
 
@@ -62,15 +63,29 @@ int recover(const EstimateInput& input, const MovedCameras& cameras, const solve
   return recovered;
 }
 
+// Adjusts, and adjusts again if the errors within images are more correlated than the options say, which then say so.
+RigAdjustment adjust_correlated(const EstimateInput& input, RigAdjustmentOptions& options,
+                                const solver::RigValues& start, RigProblem& problem) {
+  const solver::ReprojectionProblem before = problem.selected.problem;
+  RigAdjustment out = adjust_rig(problem.selected.problem, options, start, input.stop);
+  if (!out.done) return out;
+  const double correlated = correlation_in_images(input.map, problem, out.values);
+  if (correlated <= options.correlated_observations) return out;
+  options.correlated_observations = correlated;
+  problem.selected.problem = before;
+  return adjust_rig(problem.selected.problem, options, start, input.stop);
+}
+
 // A map built with a wrong calibration contains mostly the observations that agree with it, so adjusting it once stops
 // short of the truth. Therefore the rejected observations are searched again with the new calibration.
-RigAdjustment adjust_in_passes(const EstimateInput& input, const RigAdjustmentOptions& options,
-                               const MovedCameras& cameras, RigProblem& problem) {
+RigAdjustment adjust_in_passes(const EstimateInput& input, RigAdjustmentOptions options, const MovedCameras& cameras,
+                               RigProblem& problem) {
   RigAdjustmentOptions coarse = options;
   coarse.relative_decrease = kCoarseDecrease;
   solver::RigValues before = start_of(input.map, cameras);
   separate_groups(problem);
-  RigAdjustment out = adjust_rig(problem.selected.problem, coarse, before, input.stop);
+  RigAdjustment out = adjust_correlated(input, coarse, before, problem);
+  options.correlated_observations = coarse.correlated_observations;
   for (int pass = 1; pass < kPasses && out.done && !converged(out, before); ++pass) {
     before = out.values;
     if (recover(input, cameras, before, problem) == 0) break;
@@ -106,8 +121,8 @@ RigAdjustmentOptions prior_with_timing(const EstimateInput& input, const MovedCa
   separate_groups(problem);
   RigAdjustmentOptions with_timing = for_verdict(prior);
   with_timing.timing = timing_prior(input.map.rig(), input.calibrated, input.options);
-  const auto adjusted =
-      adjust_rig(problem.selected.problem, cameras.added_to(with_timing), start_of(input.map, cameras), input.stop);
+  RigAdjustmentOptions of_cameras = cameras.added_to(with_timing);
+  const RigAdjustment adjusted = adjust_correlated(input, of_cameras, start_of(input.map, cameras), problem);
   if (adjusted.done) prior.timing = contradicted(with_timing.timing, input.map.rig(), adjusted, input.options);
   return prior;
 }

@@ -46,7 +46,7 @@ struct CalibrationOptions {
   // the images contradict them by more than `suspect_ms`.
   double sigma_time_offset_ms = 5.0, sigma_readout_ms = 10.0;
   // Number of observations that carry as much information as one, because the errors of a landmark in successive images
-  // are similar.
+  // are similar. At least the number that the errors within images show (correlation_in_images).
   double correlated_observations = 10;
   // The images contradict the calibration if it increases their mean squared error by more than this fraction.
   double inconsistent_excess = 0.1;
@@ -75,7 +75,7 @@ struct CalibrationOptions {
         "scale_tolerance_percent", self.scale_tolerance_percent, Range{0, 100}, "%",
         "during a run, smaller changes of the map's scale are not applied, nor changes within its standard deviation");
     visitor("correlated_observations", self.correlated_observations, Range{1, 1e4}, "",
-            "number of observations that carry as much information as one");
+            "minimum number of observations that carry as much information as one");
     visitor("inconsistent_excess", self.inconsistent_excess, Range{0, 100}, "",
             "the images contradict a calibration that increases the mean squared error by more than this fraction");
     visitor("suspect_sigmas", self.suspect_sigmas, Range{1, 100}, "",

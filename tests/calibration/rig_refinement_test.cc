@@ -14,7 +14,7 @@
 #include "solver/rig_block.h"
 #include "tracking/camera_consensus.h"
 
-namespace bslam::calibration {
+namespace bslam::calibration::refinement {
 namespace {
 
 using geometry::SE3;
@@ -396,4 +396,4 @@ TEST(MoveSubmap, MovesKeyframesAndLandmarksTogether) {
 }
 
 }  // namespace
-}  // namespace bslam::calibration
+}  // namespace bslam::calibration::refinement

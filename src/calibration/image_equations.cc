@@ -1,0 +1,103 @@
+#include "calibration/image_equations.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace bslam::calibration {
+namespace {
+
+using geometry::Matrix6d;
+using geometry::Vector6d;
+
+constexpr int kMinObservations = 20;                         // of an image that determines extrinsics
+constexpr double kMaxUsedChi2 = 16 * solver::kChi2TwoDof95;  // of observations that are used
+constexpr double kMedianChi2SixDof = 5.348;
+constexpr std::size_t kMinPairs = 4;  // of successive images
+
+// Adds an observation to the equations of its image.
+void add(const solver::ReprojectionProblem& problem, const solver::RigValues& values,
+         const solver::ReprojectionProblem::Observation& o, ImageEquations& sums) {
+  const std::size_t c = o.camera.index();
+  const Eigen::Vector3d point_rig =
+      problem.T_rig_world[static_cast<std::size_t>(o.pose)] * problem.points[static_cast<std::size_t>(o.point)];
+  const Eigen::Vector3d point = solver::point_in_camera(problem, values, o, c, point_rig);
+  const auto residual = solver::residual(values.models[c], point, o.pixel.cast<double>());
+  if (!residual) return;
+  const double inverse_sigma = 1.0 / static_cast<double>(o.sigma);
+  const Eigen::Vector2d e = inverse_sigma * residual->error;
+  const double chi2 = e.squaredNorm();
+  if (!(chi2 < kMaxUsedChi2)) return;
+  const solver::Matrix62d Jt = solver::pose_jacobian_transposed(inverse_sigma * residual->J, point);
+  const double weight = solver::huber_weight(chi2);
+  sums.H += weight * Jt * Jt.transpose();
+  sums.b += weight * Jt * e;
+  sums.squared_errors += weight * chi2;
+  sums.keyframes = ++sums.observations >= kMinObservations;
+}
+
+}  // namespace
+
+void ImageEquations::add(const ImageEquations& other) {
+  H += other.H;
+  b += other.b;
+  squared_errors += other.squared_errors;
+  observations += other.observations;
+  keyframes += other.keyframes;
+}
+
+std::vector<ImageEquations> image_equations(const RigProblem& problem, const solver::RigValues& values) {
+  const solver::ReprojectionProblem& bundle = problem.selected.problem;
+  const std::size_t cameras = values.T_cam_rig.size();
+  std::vector<ImageEquations> out(bundle.T_rig_world.size() * cameras);
+  for (const auto& o : bundle.observations)
+    add(bundle, values, o, out[static_cast<std::size_t>(o.pose) * cameras + o.camera.index()]);
+  return out;
+}
+
+std::pair<Vector6d, double> best_change(const ImageEquations& all, const ImageEquations& after) {
+  const Eigen::LDLT<Matrix6d> factor(all.H);
+  const Matrix6d information = after.H - after.H * factor.solve(after.H);
+  const Vector6d b = after.b - after.H * factor.solve(all.b);
+  const Vector6d change = information.ldlt().solve(b);
+  return {change, b.dot(change)};
+}
+
+std::vector<std::size_t> poses_by_time(const map::BundledMap& map, const RigProblem& problem) {
+  const auto time_of = [&](std::size_t pose) { return map.keyframe(problem.selected.keyframes[pose]).frame->time_ns; };
+  std::vector<std::size_t> out(problem.selected.keyframes.size());
+  std::iota(out.begin(), out.end(), 0);
+  std::ranges::stable_sort(out, {}, time_of);
+  return out;
+}
+
+double correlation_in_images(const map::BundledMap& map, const RigProblem& problem, const solver::RigValues& values) {
+  const std::vector<std::size_t> poses = poses_by_time(map, problem);
+  const std::vector<ImageEquations> equations = image_equations(problem, values);
+  const std::size_t cameras = values.T_cam_rig.size();
+  std::vector<double> decreases;  // twice those of the cost, by independent extrinsics of two successive images
+  ImageEquations sum;
+  for (std::size_t c = 0; c < cameras; ++c) {
+    const ImageEquations* previous = nullptr;
+    for (const std::size_t pose : poses) {
+      const ImageEquations& image = equations[pose * cameras + c];
+      if (!image.enough()) continue;
+      sum.add(image);
+      if (previous != nullptr) {
+        ImageEquations both = *previous;
+        both.add(image);
+        const double decrease = best_change(both, image).second;
+        if (std::isfinite(decrease)) decreases.push_back(decrease);
+      }
+      previous = &image;
+    }
+  }
+  if (decreases.size() < kMinPairs || !(sum.squared_errors > 0)) return 1;
+  const auto middle = decreases.begin() + static_cast<std::ptrdiff_t>(decreases.size() / 2);
+  std::ranges::nth_element(decreases, middle);
+  const double variance = sum.squared_errors / (2.0 * sum.observations);
+  return std::max(1.0, *middle / (kMedianChi2SixDof * variance));
+}
+
+}  // namespace bslam::calibration
