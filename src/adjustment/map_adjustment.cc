@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "adjustment/landmark_noise.h"
 #include "adjustment/pose_uncertainty.h"
@@ -67,6 +68,36 @@ map::SetPoses adjusted_poses(const map::BundledMap& map, const BundleProblem& se
   return poses;
 }
 
+// The factors by which the adjustment changed the lengths about keyframes: if the scale of the map is not known, those
+// of a submap of which one keyframe is fixed are free. Frames that are placed relative to a keyframe follow.
+std::vector<std::pair<KeyframeId, double>> scale_changes(const map::BundledMap& map, const BundleProblem& selected) {
+  if (map.scale() != map::Scale::kUnobservable) return {};
+  struct Submap {
+    std::vector<std::size_t> fixed, free;  // poses of the problem
+  };
+  std::map<KeyframeId, Submap> submaps;  // by root
+  const std::vector<KeyframeId> root = map.root_of_each();
+  for (std::size_t i = 0; i < selected.keyframes.size(); ++i) {
+    Submap& submap = submaps[root[selected.keyframes[i].index()]];
+    (selected.problem.pose_free[i] ? submap.free : submap.fixed).push_back(i);
+  }
+  std::vector<std::pair<KeyframeId, double>> out;
+  for (const auto& [_, submap] : submaps) {
+    if (submap.fixed.size() != 1) continue;
+    const Eigen::Vector3d origin = selected.problem.T_rig_world[submap.fixed.front()].inverse().translation();
+    double before = 0, after = 0;  // sums of squared distances
+    for (const std::size_t i : submap.free) {
+      before += (map.keyframe(selected.keyframes[i]).T_rig_world.inverse().translation() - origin).squaredNorm();
+      after += (selected.problem.T_rig_world[i].inverse().translation() - origin).squaredNorm();
+    }
+    if (!(before > 0 && after > 0)) continue;
+    const double change = std::sqrt(after / before);
+    out.emplace_back(selected.keyframes[submap.fixed.front()], change);
+    for (const std::size_t i : submap.free) out.emplace_back(selected.keyframes[i], change);
+  }
+  return out;
+}
+
 // The round without robust kernel, on the inliers, with a variance for each landmark. Returns the uncertainties
 // requested by the selection.
 PoseUncertainties adjust_inliers(const map::BundledMap& map, const Selection& selection,
@@ -111,6 +142,7 @@ bool adjust_map(const Selection& selection, const AdjustmentOptions& options, co
   const std::vector<ObservationSource> bad = outlier_observations(selected, options.outlier_chi2);
   map::SetPoses poses = adjusted_poses(draft.map(), selected);
   poses.correction = selection.whole_map;
+  poses.scale_changes = scale_changes(draft.map(), selected);
   poses.uncertainties = std::move(uncertainties);
   std::vector<LandmarkId> touched;
   for (const auto& [landmark, position] : poses.landmarks) touched.push_back(landmark);

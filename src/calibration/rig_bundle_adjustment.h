@@ -51,6 +51,9 @@ struct CameraEstimate {
   // this degree of freedom appear in `change`. A common scale of all baselines is not observed unless the scale is
   // determined otherwise.
   std::array<bool, 6> observed = {};
+  // Length in metres of the part of the translation of `change` in directions that are not observed in this sense. They
+  // need not be those of axes of the camera.
+  double unobserved_shift = 0;
   // Change, standard deviation and observability of the intrinsics; empty if they are constant, or those of another
   // camera (RigAdjustmentOptions::shared).
   camera::ModelParameters intrinsics_change, intrinsics_sigma;

@@ -36,6 +36,7 @@ void evaluate_extrinsics(const CameraEstimate& estimate, const CalibrationOption
                  translation_covariance = estimate.covariance.bottomRightCorner<3, 3>();
   out.change_deg = geometry::degrees(rotation.norm());
   out.change_mm = translation.norm() * kMillimetresPerMetre;
+  out.unobserved_mm = estimate.unobserved_shift * kMillimetresPerMetre;
   out.std_deg = geometry::degrees(largest_deviation(rotation_covariance));
   out.std_mm = largest_deviation(translation_covariance) * kMillimetresPerMetre;
   out.rotation_sigmas = mahalanobis_distance(rotation, rotation_covariance);
@@ -98,14 +99,12 @@ void evaluate_scale(const EstimateInput& input, const RigEstimate& estimate, Rig
     out.scale_deviation = path_deviation(estimate.problem, estimate.adjusted.pose_effects) / estimate.path_before;
 }
 
-// The images do not constrain the position of a camera that was nevertheless displaced by far more than calibrations
-// are wrong. Their errors are not those of a calibration, but those of time stamps that jitter, for example.
+// A camera was displaced by far more than calibrations are wrong, in directions that the images do not constrain. Their
+// errors are not those of a calibration, but those of time stamps that jitter, for example.
 bool is_implausible(const std::vector<CameraRefinement>& cameras, const camera::Rig& calibrated) {
   constexpr double kMaxOfBaseline = 0.1;
   const double limit_mm = kMaxOfBaseline * kMillimetresPerMetre * longest_baseline(calibrated);
-  return std::ranges::any_of(cameras, [&](const CameraRefinement& camera) {
-    return camera.change_mm > limit_mm && !camera.translation_observed();
-  });
+  return std::ranges::any_of(cameras, [&](const CameraRefinement& camera) { return camera.unobserved_mm > limit_mm; });
 }
 
 RigRefinement evaluate(const EstimateInput& input, RigEstimate&& estimate) {

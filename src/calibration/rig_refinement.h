@@ -140,6 +140,7 @@ struct CameraRefinement {
   // Rotation around, then translation along the camera's axes: true if the images, and not only the calibration,
   // constrain it.
   std::array<bool, 6> observed = {};
+  double unobserved_mm = 0;  // length of the part of the displacement in directions that the images do not constrain
   std::vector<ParameterRefinement> intrinsics;
   TimeRefinement time_offset, readout;  // the time offset of camera 0 is constant
   int observations = 0;                 // number of keypoints

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "adjustment/robust_cost.h"
+#include "map/anchored_pose.h"
 #include "mapping/simulated_map.h"
 
 namespace bslam::adjustment {
@@ -209,6 +210,36 @@ TEST(AdjustMap, IsDeterministic) {
     EXPECT_EQ(a.map().keyframe(k).T_rig_world.translation(), b.map().keyframe(k).T_rig_world.translation());
   }
   EXPECT_EQ(a.map().num_observations(), b.map().num_observations());
+}
+
+// An adjustment that changes the size of a map of unknown scale records this change, so that frames keep their places
+// relative to the keyframes. A map of known scale, or of which two keyframes are fixed, is not rescaled.
+TEST(AdjustMap, RecordsChangesOfAScaleThatIsNotKnown) {
+  constexpr double kWrong = 1.3;
+  const KeyframeId root(0), second(1);
+  for (const int fixed : {1, 2}) {
+    map::SimulatedMap world = true_map(synthetic::ring_rig(4), 6);
+    world.map.set_scale(map::Scale::kUnobservable);
+    const double before = map::distance_m(world.map.keyframe(root).T_rig_world, world.map.keyframe(second).T_rig_world);
+    const SE3 between = world.map.keyframe(root).T_rig_world.perturbed(
+        0.5 * (world.map.keyframe(second).T_rig_world * world.map.keyframe(root).T_rig_world.inverse()).log());
+    const auto frame = map::AnchoredPose::at(world.map, root, between);
+    ASSERT_TRUE(world.map.scale_submap(root, kWrong));
+    map::MapDraft draft = world.draft();
+    ASSERT_TRUE(adjust_map(everything(world.map, fixed), {.robust_iterations = 30}, kFeatures, draft));
+    const map::BundledMap& adjusted = draft.map();
+    const double change = adjusted.keyframe(root).scale;
+    if (fixed == 2) {
+      EXPECT_EQ(change, kWrong);
+      continue;
+    }
+    // The overlapping cameras know the true scale.
+    EXPECT_NEAR(change, 1.0, 0.03);
+    for (const KeyframeId k : adjusted.keyframe_ids()) EXPECT_EQ(adjusted.keyframe(k).scale, change);
+    const double after = map::distance_m(adjusted.keyframe(root).T_rig_world, adjusted.keyframe(second).T_rig_world);
+    EXPECT_NEAR(map::distance_m(*frame.resolve(adjusted), adjusted.keyframe(root).T_rig_world), 0.5 * after,
+                0.03 * before);
+  }
 }
 
 }  // namespace

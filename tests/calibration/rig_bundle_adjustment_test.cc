@@ -207,6 +207,28 @@ TEST(AdjustRig, ADisplacedCameraDoesNotChangeTheScale) {
     EXPECT_LT(error_of(result, c, scene->rig).tail<3>().norm(), 0.004) << "camera " << c;
 }
 
+// The images determine where a camera of a pair is but for the length of the baseline.
+TEST(AdjustRig, OnlyTheDisplacementAlongTheBaselineIsNotObserved) {
+  const auto scene = walk(2, 6, 0.05, 600);
+  const Vector3d baseline = scene->rig.cam_from_rig(1).translation().normalized();
+  for (const bool along : {false, true}) {
+    const Vector3d shift = 0.015 * (along ? baseline : baseline.unitOrthogonal());
+    const Rig calibrated = with_error(scene->rig, 1, (Vector6d() << Vector3d::Zero(), shift).finished());
+    solver::ReprojectionProblem problem = scene->problem;
+    problem.rig = &calibrated;
+    RigAdjustmentOptions options;
+    options.sigma_translation = 0.01;
+    options.sigma_scale = 5e-3;
+    const RigAdjustment result = adjust_rig(problem, options);
+    ASSERT_TRUE(result.done);
+    const CameraEstimate& camera = result.cameras[1];
+    const Vector3d change = camera.change.tail<3>();
+    EXPECT_GT(change.norm(), along ? 0.0 : 0.012);
+    EXPECT_NEAR(camera.unobserved_shift, std::abs(change.dot(baseline)), 0.001) << along;
+    EXPECT_LT(camera.unobserved_shift, 0.005) << along;
+  }
+}
+
 TEST(AdjustRig, CamerasAreDisplacedAtTheScaleOfTheOthers) {
   const auto at = [](double x, double y) { return SE3(Eigen::Quaterniond::Identity(), Vector3d(x, y, 0)); };
   const solver::ExtrinsicPrior prior{
