@@ -67,6 +67,21 @@ bool tracked_throughout(std::span<const FrameRecord> frames) {
   });
 }
 
+// T_rig_odom of each frame at the scale of `map`. The motion since the frame before was tracked at the scale that the
+// map had then.
+std::vector<SE3> rescaled_odometry(const map::BundledMap& map, std::span<const FrameRecord> frames) {
+  std::vector<SE3> out;
+  bool rescaled = false;
+  for (std::size_t f = 0; f < frames.size(); ++f) {
+    const SE3& odometry = frames[f].T_rig_odom;
+    const double change = f > 0 ? frames[f].result.anchored.scale_change(map) : 1.0;
+    rescaled |= change != 1.0;
+    out.push_back(rescaled ? geometry::scaled(odometry * frames[f - 1].T_rig_odom.inverse(), change) * out.back()
+                           : odometry);
+  }
+  return out;
+}
+
 }  // namespace
 
 std::vector<std::optional<SE3>> poses_between_keyframes(const map::BundledMap& map, KeyframeId first,
@@ -80,10 +95,11 @@ std::vector<std::optional<SE3>> poses_between_keyframes(const map::BundledMap& m
     if (root_before != root_after || !tracked_throughout(frames.subspan(begin, end - begin + 1))) continue;
     const double duration_s = to_seconds(frames[end].result.time_ns - frames[begin].result.time_ns);
     if (!(duration_s > 0)) continue;
+    const std::vector<SE3> odometry = rescaled_odometry(map, frames.subspan(begin, end - begin + 1));
     for (std::size_t f = begin; f <= end; ++f) {
-      const SE3& odometry = frames[f].T_rig_odom;
-      const SE3 from_before = odometry * frames[begin].T_rig_odom.inverse() * T_before;
-      const SE3 from_after = odometry * frames[end].T_rig_odom.inverse() * T_after;
+      const SE3& T_rig_odom = odometry[f - begin];
+      const SE3 from_before = T_rig_odom * odometry.front().inverse() * T_before;
+      const SE3 from_after = T_rig_odom * odometry.back().inverse() * T_after;
       const double weight = to_seconds(frames[f].result.time_ns - frames[begin].result.time_ns) / duration_s;
       out[f] = SE3::exp(weight * (from_after * from_before.inverse()).log()) * from_before;
     }

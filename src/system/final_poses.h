@@ -25,8 +25,9 @@ std::optional<geometry::SE3> T_rig_world_of(const tracking::FrameRecord& record,
 
 // Poses of all frames of a run whose calibration was refined. Frames between two keyframes were tracked with an earlier
 // calibration than that of the final map, so that their motion relative to the first keyframe does not end at the
-// second one. This difference is distributed over the frames in proportion to time. The first frame after a change of
-// the calibration keeps its pose, as keyframes do. `first`: the first keyframe of the run.
+// second one. This difference is distributed over the frames in proportion to time. Their motion is rescaled if the
+// scale of the map has changed since. The first frame after a change of the calibration keeps its pose, as keyframes
+// do. `first`: the first keyframe of the run.
 std::vector<std::optional<geometry::SE3>> poses_between_keyframes(const map::BundledMap& map, KeyframeId first,
                                                                   std::span<const tracking::FrameRecord> frames);
 

@@ -188,5 +188,33 @@ TEST(FinalPoses, FramesAfterAChangeOfTheCalibrationDoNotShareTheErrorOfThoseBefo
   EXPECT_LT((poses[6]->matrix() - (moved(1) * T_start).matrix()).norm(), 0.02);
 }
 
+// The map is scaled between frames 7 and 8, and once more at the end. The rig moves at a varying speed, so that the
+// difference to the second keyframe, distributed over time, would not make up for another scale of the motion.
+TEST(FinalPoses, FramesBetweenKeyframesAreAtTheScaleOfTheMap) {
+  Scene scene(0.0, 11);
+  map::BundledMap& map = scene.map;  // its keyframe is frame 5
+  constexpr double kPosition[] = {0, 0.1, 0.5, 0.6, 0.6, 1.0}, kFirst = 2.0, kSecond = 1.5;
+  const auto moved = [](double x) { return SE3(geometry::Quaterniond::Identity(), {x, 0, 0}); };
+  const auto track = [&](std::size_t i, double scale) {
+    FrameRecord& now = scene.frames[5 + i];
+    now.result.anchored = map::AnchoredPose::at(map, KeyframeId(0),
+                                                moved(scale * kPosition[i]) * map.keyframe(KeyframeId(0)).T_rig_world);
+    if (i > 0) now.T_rig_odom = moved(scale * (kPosition[i] - kPosition[i - 1])) * scene.frames[4 + i].T_rig_odom;
+  };
+  for (std::size_t i = 0; i < 3; ++i) track(i, 1.0);
+  ASSERT_TRUE(map.scale_submap(KeyframeId(0), kFirst));
+  for (std::size_t i = 3; i < 6; ++i) track(i, kFirst);
+  auto last = std::make_shared<frame::BundledFrame>(*map.keyframe(KeyframeId(0)).frame);
+  last->id = FrameId(10);
+  map.add_keyframe(last, moved(kFirst * kPosition[5]) * map.keyframe(KeyframeId(0)).T_rig_world, {}, KeyframeId(0));
+  ASSERT_TRUE(map.scale_submap(KeyframeId(0), kSecond));
+  const auto poses = poses_between_keyframes(map, KeyframeId(0), scene.frames);
+  for (std::size_t i = 0; i < 6; ++i) {
+    const SE3 expected = moved(kFirst * kSecond * kPosition[i]) * map.keyframe(KeyframeId(0)).T_rig_world;
+    ASSERT_TRUE(poses[5 + i]);
+    EXPECT_LT((poses[5 + i]->matrix() - expected.matrix()).norm(), 1e-12) << i;
+  }
+}
+
 }  // namespace
 }  // namespace bslam::system
