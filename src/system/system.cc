@@ -103,10 +103,9 @@ Result<FrameRecord> System::process(const image::ImageBundle& images) {
   maps_started_ += outcome.started_submap;
   observed_ = std::move(outcome.observed);
   std::ranges::move(outcome.early, std::back_inserter(early_));
-  // A monocular initialisation adds two keyframes, both with the time of the second frame.
-  for (const KeyframeId k : outcome.keyframes) records_.set_keyframe_time(k, outcome.record.result.time_ns);
+  for (const auto& [k, time_ns] : outcome.keyframes) records_.set_keyframe_time(k, time_ns);
   const Stopwatch watch;
-  for (const KeyframeId k : outcome.keyframes) executor_->enqueue(k);
+  for (const auto& added : outcome.keyframes) executor_->enqueue(added.id);
   if (outcome.deferred) enqueue(*outcome.deferred, outcome.record.result.time_ns);
   if ((outcome.deferred || !outcome.keyframes.empty()) && config_.mode != execution::Mode::kSequential) {
     outcome.record.stages.push_back({"wait", watch.ms()});
