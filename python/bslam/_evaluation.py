@@ -94,7 +94,11 @@ def evaluate(
 def _trajectory(given: Any, name: str) -> Path | NDArray[np.float64]:
     if isinstance(given, (str, os.PathLike)):
         return given
-    rows = np.ascontiguousarray(given, dtype=np.float64)
+    try:
+        rows = np.ascontiguousarray(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        found = type(given).__name__
+        raise _bslam.Error(f"{name}: found {found}, expected a file or numbers of shape (n, 8)") from None
     if rows.ndim != 2 or rows.shape[1] != 8:
         raise _bslam.Error(f"{name}: found shape {rows.shape}, expected (n, 8): t, x, y, z, qx, qy, qz, qw")
     return rows
