@@ -149,6 +149,7 @@ nb::dict dict_of(const evaluation::TrajectoryEvaluation& e) {
   out["rpe_rotation_deg"] = dict_of(e.rpe.rotation_deg);
   out["scale"] = e.scale;
   out["coverage"] = e.coverage;
+  out["coverage_of_part"] = e.coverage_of_part;
   out["gt_length_m"] = e.gt_length_m;
   out["aligned"] = rows_of(e.aligned_estimate);
   out["errors"] = rows_of(e.errors);

@@ -15,7 +15,7 @@ def test_errors_are_those_of_the_program(recording, program, program_run, align)
         assert getattr(found.ate, name) == value
     assert found.rpe_translation.rmse == theirs["rpe"]["trans_rmse"]
     assert found.rpe_rotation_deg.rmse == theirs["rpe"]["rot_rmse_deg"]
-    for name in ("scale", "coverage", "gt_length_m"):
+    for name in ("scale", "coverage", "coverage_of_part", "gt_length_m"):
         assert getattr(found, name) == theirs[name]
 
 
