@@ -107,7 +107,7 @@ class BSLAM_EXPORT System {
   MapView map() const;
 
   // Saves the current version of the map, for Startup::map and `bslam map`. The file is written completely or not at
-  // all. Error: it cannot be written.
+  // all. It replaces an earlier map, and no other file. Errors: it cannot be written; the file is of another kind.
   Status save_map(const std::filesystem::path& file) const;
 
   // Return the poses of all frames that have one, corrected by the current map: trajectory() for the submap with the

@@ -35,6 +35,7 @@ class Evaluation:
         rpe_rotation_deg: relative errors over `delta` seconds, in degrees.
         scale: scale of the best alignment by a similarity, truth = scale * estimate; None if it is not determined.
         coverage: fraction of the frames with ground truth that have an estimated pose.
+        coverage_of_part: the same of the frames from the first to the last estimated pose.
         gt_length_m: length of the path of the ground truth.
         aligned: (n, 8) the estimate in the world frame of the ground truth: t, x, y, z, qx, qy, qz, qw.
         errors: (k, 2) time in seconds and distance in metres of every compared pose.
@@ -45,6 +46,7 @@ class Evaluation:
     rpe_rotation_deg: Statistics
     scale: float | None
     coverage: float
+    coverage_of_part: float
     gt_length_m: float
     aligned: NDArray[np.float64]
     errors: NDArray[np.float64]
@@ -94,7 +96,11 @@ def evaluate(
 def _trajectory(given: Any, name: str) -> Path | NDArray[np.float64]:
     if isinstance(given, (str, os.PathLike)):
         return given
-    rows = np.ascontiguousarray(given, dtype=np.float64)
+    try:
+        rows = np.ascontiguousarray(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        found = type(given).__name__
+        raise _bslam.Error(f"{name}: found {found}, expected a file or numbers of shape (n, 8)") from None
     if rows.ndim != 2 or rows.shape[1] != 8:
         raise _bslam.Error(f"{name}: found shape {rows.shape}, expected (n, 8): t, x, y, z, qx, qy, qz, qw")
     return rows

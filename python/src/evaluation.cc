@@ -12,6 +12,7 @@
 #include <variant>
 #include <vector>
 
+#include "arguments.h"
 #include "arrays.h"
 #include "base/atomic_file.h"
 #include "bindings.h"
@@ -148,6 +149,7 @@ nb::dict dict_of(const evaluation::TrajectoryEvaluation& e) {
   out["rpe_rotation_deg"] = dict_of(e.rpe.rotation_deg);
   out["scale"] = e.scale;
   out["coverage"] = e.coverage;
+  out["coverage_of_part"] = e.coverage_of_part;
   out["gt_length_m"] = e.gt_length_m;
   out["aligned"] = rows_of(e.aligned_estimate);
   out["errors"] = rows_of(e.errors);
@@ -188,18 +190,34 @@ nb::dict evaluate(const Given& est, const Given& gt, const Arguments& a) {
   return dict_of(*result);
 }
 
+std::optional<Path> path_argument(nb::handle object, const char* key) {
+  return optional_argument<Path>(object, "evaluate", key, "the name of a file");
+}
+
+Arguments arguments_of(nb::handle align, nb::handle gt_frame, nb::handle max_dt, nb::handle delta, nb::handle rig,
+                       nb::handle times, nb::handle plot, nb::handle camera) {
+  return {argument<std::string>(align, "evaluate", "align", "se3, sim3 or none"),
+          argument<std::string>(gt_frame, "evaluate", "gt_frame", "cam0 or body"),
+          argument<double>(max_dt, "evaluate", "max_dt", "a number of seconds"),
+          argument<double>(delta, "evaluate", "delta", "a number of seconds"),
+          path_argument(rig, "rig"),
+          path_argument(times, "times"),
+          path_argument(plot, "plot"),
+          optional_argument<int>(camera, "evaluate", "camera", "the number of a camera")};
+}
+
 }  // namespace
 
 void bind_evaluation(nb::module_& module) {
   module.def(
       "evaluate",
-      [](const Given& est, const Given& gt, const std::string& align, double max_dt, double delta,
-         const std::string& gt_frame, const std::optional<Path>& rig, std::optional<int> camera,
-         const std::optional<Path>& times, const std::optional<Path>& plot) {
-        return evaluate(est, gt, {align, gt_frame, max_dt, delta, rig, times, plot, camera});
+      [](const Given& est, const Given& gt, nb::handle align, nb::handle max_dt, nb::handle delta, nb::handle gt_frame,
+         nb::handle rig, nb::handle camera, nb::handle times, nb::handle plot) {
+        return evaluate(est, gt, arguments_of(align, gt_frame, max_dt, delta, rig, times, plot, camera));
       },
-      nb::arg("est"), nb::arg("gt"), nb::arg("align"), nb::arg("max_dt"), nb::arg("delta"), nb::arg("gt_frame"),
-      nb::arg("rig").none(), nb::arg("camera").none(), nb::arg("times").none(), nb::arg("plot").none());
+      nb::arg("est"), nb::arg("gt"), nb::arg("align").none(), nb::arg("max_dt").none(), nb::arg("delta").none(),
+      nb::arg("gt_frame").none(), nb::arg("rig").none(), nb::arg("camera").none(), nb::arg("times").none(),
+      nb::arg("plot").none());
 }
 
 }  // namespace bslam::python

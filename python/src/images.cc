@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "arguments.h"
 #include "errors.h"
 
 namespace bslam::python {
@@ -93,7 +94,8 @@ void check_length(nb::handle sequence, const char* key, std::size_t images, cons
 
 }  // namespace
 
-BorrowedImages read_images(nb::handle stamps, nb::sequence images, nb::handle masks) {
+BorrowedImages read_images(nb::handle stamps, nb::handle images, nb::handle masks) {
+  check_sequence(images, kProcess, "images", "a list of arrays, one per camera of the rig");
   BorrowedImages out;
   const std::size_t count = nb::len(images);
   std::optional<std::int64_t> common;
@@ -102,7 +104,7 @@ BorrowedImages read_images(nb::handle stamps, nb::sequence images, nb::handle ma
   if (!masks.is_none()) check_length(masks, "masks", count, "a list of arrays");
   for (std::size_t i = 0; i < count; ++i) {
     CameraImage& image = out.bundle.images.emplace_back();
-    const nb::object object = images[i];
+    const nb::object object(images[i]);
     if (object.is_none()) continue;
     out.arrays.push_back(pixels_of(object, element("images", i)));
     image = image_of(out.arrays.back());

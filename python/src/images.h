@@ -19,6 +19,6 @@ struct BorrowedImages {
 // image, in nanoseconds; `images` are arrays or None, and so are `masks`, which may be None altogether. Throws Failure
 // for a wrong type or shape, rows whose pixels are not contiguous, a number of stamps or masks that differs from the
 // number of images, or a mask whose size differs from that of its image.
-BorrowedImages read_images(nanobind::handle stamps, nanobind::sequence images, nanobind::handle masks);
+BorrowedImages read_images(nanobind::handle stamps, nanobind::handle images, nanobind::handle masks);
 
 }  // namespace bslam::python

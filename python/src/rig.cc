@@ -9,8 +9,10 @@
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
+#include <tuple>
 #include <utility>
 
+#include "arguments.h"
 #include "arrays.h"
 #include "bindings.h"
 #include "errors.h"
@@ -45,21 +47,44 @@ std::optional<Array<std::uint8_t, -1, -1>> mask_array(const CameraCalibration& c
       camera.mask, {static_cast<std::size_t>(camera.height), static_cast<std::size_t>(camera.width)});
 }
 
-CameraCalibration make_camera(std::string model, std::pair<int, int> resolution, std::array<double, 4> intrinsics,
-                              std::vector<double> distortion, const std::optional<GivenMatrix>& T_body_cam,
-                              std::string name, double time_offset_s, double rolling_shutter_readout_s,
-                              const std::optional<GivenMask>& mask) {
+template <class T>
+T camera_argument(nb::handle object, const char* key, const char* expected) {
+  return argument<T>(object, "Camera", key, expected);
+}
+
+CameraCalibration make_camera(nb::handle model, nb::handle resolution, nb::handle intrinsics, nb::handle distortion,
+                              nb::handle T_body_cam, nb::handle name, nb::handle time_offset_s, nb::handle readout_s,
+                              nb::handle mask) {
   CameraCalibration out;
-  out.name = std::move(name);
-  out.model = std::move(model);
-  out.width = resolution.first;
-  out.height = resolution.second;
-  out.intrinsics = intrinsics;
-  out.distortion = std::move(distortion);
-  if (T_body_cam) out.T_body_cam = pose_of(*T_body_cam);
-  out.time_offset_s = time_offset_s;
-  out.rolling_shutter_readout_s = rolling_shutter_readout_s;
-  if (mask) out.mask = mask_of(*mask, out.width, out.height);
+  out.name = camera_argument<std::string>(name, "name", "a text");
+  out.model = camera_argument<std::string>(model, "model", "the name of a model, such as pinhole");
+  std::tie(out.width, out.height) =
+      camera_argument<std::pair<int, int>>(resolution, "resolution", "two integers: width, height");
+  out.intrinsics =
+      camera_argument<std::array<double, 4>>(intrinsics, "intrinsics", "four numbers: fx, fy, cx, cy in pixels");
+  if (!distortion.is_none())
+    out.distortion = camera_argument<std::vector<double>>(distortion, "distortion", "a list of numbers");
+  if (!T_body_cam.is_none())
+    out.T_body_cam = pose_of(camera_argument<GivenMatrix>(T_body_cam, "T_body_cam", "an array of shape (4, 4)"));
+  out.time_offset_s = camera_argument<double>(time_offset_s, "time_offset_s", "a number of seconds");
+  out.rolling_shutter_readout_s =
+      camera_argument<double>(readout_s, "rolling_shutter_readout_s", "a number of seconds");
+  if (!mask.is_none())
+    out.mask =
+        mask_of(camera_argument<GivenMask>(mask, "mask", "an array of shape (height, width)"), out.width, out.height);
+  return out;
+}
+
+std::vector<CameraCalibration> cameras_of(nb::handle list) {
+  constexpr const char* kExpected = "a list of Camera; Rig.load(path) reads a calibration";
+  check_sequence(list, "Rig", "cameras", kExpected);
+  std::vector<CameraCalibration> out;
+  for (std::size_t i = 0; i < nb::len(list); ++i) {
+    const nb::object camera(list[i]);
+    if (!nb::isinstance<CameraCalibration>(camera))
+      raise({"Rig", "cameras[" + std::to_string(i) + "]", description_of(camera), "a Camera"});
+    out.push_back(*nb::inst_ptr<CameraCalibration>(camera));
+  }
   return out;
 }
 
@@ -79,15 +104,21 @@ void bind_camera(nb::module_& module) {
   nb::class_<C>(module, "Camera", "Calibration of one camera. Axes: x right, y down, z forward.")
       .def(
           "__init__",
-          [](C* self, std::string model, std::pair<int, int> resolution, std::array<double, 4> intrinsics,
-             std::vector<double> distortion, const std::optional<GivenMatrix>& T_body_cam, std::string name,
-             double time_offset_s, double readout_s, const std::optional<GivenMask>& mask) {
-            new (self) C(make_camera(std::move(model), resolution, intrinsics, std::move(distortion), T_body_cam,
-                                     std::move(name), time_offset_s, readout_s, mask));
+          [](C* self, nb::handle model, nb::handle resolution, nb::handle intrinsics, nb::handle distortion,
+             nb::handle T_body_cam, nb::handle name, nb::handle time_offset_s, nb::handle readout_s, nb::handle mask) {
+            new (self) C(make_camera(model, resolution, intrinsics, distortion, T_body_cam, name, time_offset_s,
+                                     readout_s, mask));
           },
-          nb::kw_only(), nb::arg("model"), nb::arg("resolution"), nb::arg("intrinsics"),
-          nb::arg("distortion") = std::vector<double>(), nb::arg("T_body_cam") = nb::none(), nb::arg("name") = "",
-          nb::arg("time_offset_s") = 0.0, nb::arg("rolling_shutter_readout_s") = 0.0, nb::arg("mask") = nb::none(),
+          nb::kw_only(), nb::arg("model").none(), nb::arg("resolution").none(), nb::arg("intrinsics").none(),
+          nb::arg("distortion").none() = nb::none(), nb::arg("T_body_cam").none() = nb::none(),
+          nb::arg("name").none() = "", nb::arg("time_offset_s").none() = 0.0,
+          nb::arg("rolling_shutter_readout_s").none() = 0.0, nb::arg("mask").none() = nb::none(),
+          nb::sig("def __init__(self, *, model: str, resolution: tuple[int, int], "
+                  "intrinsics: collections.abc.Sequence[float], "
+                  "distortion: collections.abc.Sequence[float] | None = None, "
+                  "T_body_cam: numpy.typing.NDArray[numpy.float64] | None = None, name: str = \"\", "
+                  "time_offset_s: float = 0.0, rolling_shutter_readout_s: float = 0.0, "
+                  "mask: numpy.typing.NDArray[numpy.uint8] | None = None) -> None"),
           "Creates a calibration. Names are those of the rig file of bslam.\n\n"
           "Args:\n"
           "    model: pinhole, pinhole-radtan, kannala-brandt, ucm, eucm, double-sphere or fov.\n"
@@ -123,11 +154,9 @@ void bind_rig(nb::module_& module) {
   bind_camera(module);
   nb::class_<Rig>(module, "Rig", "The calibrated cameras of a rig; immutable. Camera 0 is the reference of all poses.")
       .def(
-          "__init__",
-          [](Rig* self, const std::vector<CameraCalibration>& cameras) {
-            new (self) Rig(value_of(Rig::make(cameras)));
-          },
-          nb::arg("cameras"), "Creates a rig from calibrations; the first one is camera 0.")
+          "__init__", [](Rig* self, nb::handle cameras) { new (self) Rig(value_of(Rig::make(cameras_of(cameras)))); },
+          nb::arg("cameras").none(), nb::sig("def __init__(self, cameras: collections.abc.Sequence[Camera]) -> None"),
+          "Creates a rig from calibrations; the first one is camera 0.")
       .def_static(
           "load", load_rig, nb::arg("path"), nb::arg("cameras") = nb::none(), nb::call_guard<nb::gil_scoped_release>(),
           "Reads a calibration of any known format, recognised by its content (bslam, EuRoC, Kalibr, OpenVINS,\n"

@@ -9,6 +9,7 @@
 #include <string>
 #include <utility>
 
+#include "arguments.h"
 #include "arrays.h"
 #include "bindings.h"
 #include "errors.h"
@@ -29,7 +30,7 @@ class PythonSystem {
   PythonSystem(const PythonSystem&) = delete;
   PythonSystem& operator=(const PythonSystem&) = delete;
 
-  FrameResult process(nb::handle stamps, nb::sequence images, nb::handle masks);
+  FrameResult process(nb::handle stamps, nb::handle images, nb::handle masks);
   void finish();
   System& operator*() { return *system_; }
   Handlers& handlers() { return handlers_; }
@@ -55,8 +56,8 @@ PythonSystem::~PythonSystem() {
   system_.reset();
 }
 
-FrameResult PythonSystem::process(nb::handle stamps, nb::sequence images, nb::handle masks) {
-  const BorrowedImages borrowed = read_images(stamps, std::move(images), masks);
+FrameResult PythonSystem::process(nb::handle stamps, nb::handle images, nb::handle masks) {
+  const BorrowedImages borrowed = read_images(stamps, images, masks);
   auto frame = [&] {
     const nb::gil_scoped_release unlocked;
     return system_->process(borrowed.bundle);
@@ -118,28 +119,49 @@ PyType_Slot g_slots[] = {{Py_tp_traverse, reinterpret_cast<void*>(visit_referenc
                          {Py_tp_clear, reinterpret_cast<void*>(clear_references)},
                          {0, nullptr}};
 
+const Rig& rig_argument(nb::handle rig) {
+  if (!nb::isinstance<Rig>(rig))
+    raise({"System", "rig", description_of(rig), "a Rig; Rig.load(path) reads a calibration"});
+  return *nb::inst_ptr<Rig>(rig);
+}
+
+Path path_argument(nb::handle path, const char* key) {
+  return optional_argument<Path>(path, "System", key, "the name of a file").value_or("");
+}
+
+SettingArguments setting_arguments(nb::handle mode, nb::handle settings, nb::handle config, nb::handle seed,
+                                   nb::handle localize_only) {
+  if (!settings.is_none() && !nb::hasattr(settings, "items"))
+    raise({"System", "settings", description_of(settings), "a dict of names and values"});
+  return {optional_argument<Path>(config, "System", "config", "the name of a file"), settings,
+          argument<std::string>(mode, "System", "mode", "sequential, lagged or parallel"),
+          optional_argument<int>(seed, "System", "seed", "an integer"),
+          argument<bool>(localize_only, "System", "localize_only", "True or False")};
+}
+
 void bind_constructor(nb::class_<PythonSystem>& system) {
   system.def(
       "__init__",
-      [](PythonSystem* self, const Rig& rig, const std::string& mode, nb::handle settings,
-         const std::optional<Path>& config, std::optional<int> seed, const std::optional<Path>& load_map,
-         bool localize_only, const std::optional<Path>& vocabulary, std::size_t history_frames, nb::object on_keyframe,
-         nb::object on_loop, nb::object on_camera, nb::object on_log) {
+      [](PythonSystem* self, nb::handle rig, nb::handle mode, nb::handle settings, nb::handle config, nb::handle seed,
+         nb::handle load_map, nb::handle localize_only, nb::handle vocabulary, nb::handle history_frames,
+         nb::object on_keyframe, nb::object on_loop, nb::object on_camera, nb::object on_log) {
+        const Rig& cameras = rig_argument(rig);
         Startup startup;
-        startup.map = load_map.value_or("");
-        startup.vocabulary = vocabulary.value_or("");
-        startup.history_frames = history_frames;
+        startup.map = path_argument(load_map, "load_map");
+        startup.vocabulary = path_argument(vocabulary, "vocabulary");
+        startup.history_frames =
+            argument<std::size_t>(history_frames, "System", "history_frames", "an integer of 0 or more");
         Handlers handlers;
         handlers.keyframe = std::move(on_keyframe);
         handlers.loop = std::move(on_loop);
         handlers.camera = std::move(on_camera);
         handlers.log = std::move(on_log);
-        new (self) PythonSystem(rig, make_config({config, settings, mode, seed, localize_only}), std::move(startup),
-                                std::move(handlers));
+        new (self) PythonSystem(cameras, make_config(setting_arguments(mode, settings, config, seed, localize_only)),
+                                std::move(startup), std::move(handlers));
       },
-      nb::arg("rig"), nb::arg("mode") = "", nb::kw_only(), nb::arg("settings") = nb::none(),
+      nb::arg("rig").none(), nb::arg("mode").none() = "", nb::kw_only(), nb::arg("settings") = nb::none(),
       nb::arg("config") = nb::none(), nb::arg("seed") = nb::none(), nb::arg("load_map") = nb::none(),
-      nb::arg("localize_only") = false, nb::arg("vocabulary") = nb::none(), nb::arg("history_frames") = 0,
+      nb::arg("localize_only").none() = false, nb::arg("vocabulary") = nb::none(), nb::arg("history_frames").none() = 0,
       nb::arg("on_keyframe") = nb::none(), nb::arg("on_loop") = nb::none(), nb::arg("on_camera") = nb::none(),
       nb::arg("on_log") = nb::none(),
       nb::sig("def __init__(self, rig: Rig, mode: str = \"\", *, "
@@ -172,7 +194,8 @@ void bind_constructor(nb::class_<PythonSystem>& system) {
 void bind_processing(nb::class_<PythonSystem>& system) {
   system
       .def(
-          "process", &PythonSystem::process, nb::arg("stamps"), nb::arg("images"), nb::arg("masks") = nb::none(),
+          "process", &PythonSystem::process, nb::arg("stamps").none(), nb::arg("images").none(),
+          nb::arg("masks") = nb::none(),
           nb::sig("def process(self, stamps: int | collections.abc.Sequence[int | None], "
                   "images: collections.abc.Sequence[numpy.typing.NDArray[numpy.uint8] | None], "
                   "masks: collections.abc.Sequence[numpy.typing.NDArray[numpy.uint8] | None] | None = None) -> Frame"),
@@ -206,7 +229,8 @@ void bind_system(nb::module_& module) {
   system
       .def(
           "map", [](PythonSystem& s) { return (*s).map(); }, "Returns the current version of the map.")
-      .def("save_map", save_map, nb::arg("path"), "Saves the current map, completely or not at all.")
+      .def("save_map", save_map, nb::arg("path"),
+           "Saves the current map, completely or not at all. It replaces an earlier map, and no other file.")
       .def(
           "trajectory",
           [](PythonSystem& s, const std::string& frame) {

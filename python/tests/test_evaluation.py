@@ -15,7 +15,7 @@ def test_errors_are_those_of_the_program(recording, program, program_run, align)
         assert getattr(found.ate, name) == value
     assert found.rpe_translation.rmse == theirs["rpe"]["trans_rmse"]
     assert found.rpe_rotation_deg.rmse == theirs["rpe"]["rot_rmse_deg"]
-    for name in ("scale", "coverage", "gt_length_m"):
+    for name in ("scale", "coverage", "coverage_of_part", "gt_length_m"):
         assert getattr(found, name) == theirs[name]
 
 
@@ -129,6 +129,11 @@ def test_wrong_arrays_and_options_are_errors(recording):
         (truth, {"align": "se2"}, "^evaluate: align: found se2, expected se3, sim3 or none$"),
         (truth, {"gt_frame": "body"}, "^evaluate: gt_frame=body: found no rig"),
         (truth, {"max_dt": -1}, "^evaluate: max_dt: found -1"),
+        ([["t", "x"]], {}, r"^est: found list, expected a file or numbers of shape \(n, 8\)$"),
+        (None, {}, r"^est: found shape \(1,\), expected \(n, 8\)"),
+        (truth, {"align": 3}, "^evaluate: align: found int 3, expected se3, sim3 or none$"),
+        (truth, {"max_dt": "1 s"}, "^evaluate: max_dt: found str '1 s', expected a number of seconds$"),
+        (truth, {"rig": 3}, "^evaluate: rig: found int 3, expected the name of a file$"),
     ]
     for est, options, text in cases:
         with pytest.raises(bslam.Error, match=text):

@@ -52,6 +52,16 @@ def test_saved_map_is_that_of_the_program(finished, program, program_run, tmp_pa
     assert (info["keyframes"], info["landmarks"]) == (mine.num_keyframes, mine.num_landmarks)
 
 
+def test_a_saved_map_replaces_an_earlier_map_and_no_other_file(finished, tmp_path):
+    notes = tmp_path / "notes.txt"
+    notes.write_text("precious")
+    with pytest.raises(bslam.Error, match=r"notes.txt: found an existing file of another kind, expected a new name"):
+        finished[0].save_map(notes)
+    assert notes.read_text() == "precious"
+    for _ in range(2):
+        finished[0].save_map(tmp_path / "map.bmap")
+
+
 def test_map_is_loaded_by_a_system(recording, program_run):
     system, frames = recording.run(load_map=program_run / "map.bmap", localize_only=True)
     assert any(frame.relocalised for frame in frames)

@@ -63,6 +63,30 @@ def test_masks_are_numbers_of_one_byte():
             camera(mask=other)
 
 
+def test_arguments_of_other_types_are_errors_in_one_line():
+    reads = "expected a list of Camera; Rig.load(path) reads a calibration"
+    cases = [
+        (lambda: bslam.Rig("rig.yaml"), f"Rig: cameras: found str 'rig.yaml', {reads}"),
+        (lambda: bslam.Rig(None), f"Rig: cameras: found None, {reads}"),
+        (lambda: bslam.Rig(camera()), f"Rig: cameras: found Camera, {reads}"),
+        (lambda: bslam.Rig([camera(), {}]), "Rig: cameras[1]: found dict, expected a Camera"),
+        (lambda: camera(model=3), "Camera: model: found int 3, expected the name of a model, such as pinhole"),
+        (lambda: camera(resolution=64), "Camera: resolution: found int 64, expected two integers: width, height"),
+        (
+            lambda: camera(intrinsics=[50, 50]),
+            "Camera: intrinsics: found list of 2, expected four numbers: fx, fy, cx, cy in pixels",
+        ),
+        (
+            lambda: camera(T_body_cam=np.eye(3)),
+            "Camera: T_body_cam: found array of float64, shape (3, 3), expected an array of shape (4, 4)",
+        ),
+    ]
+    for call, text in cases:
+        with pytest.raises(bslam.Error) as error:
+            call()
+        assert str(error.value) == text
+
+
 def test_masks_are_saved_with_the_rig(tmp_path):
     mask = np.full((48, 64), 255, np.uint8)
     mask[:20] = 0

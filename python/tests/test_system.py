@@ -100,6 +100,10 @@ INVALID_INPUTS = [
      "calibration"),
     (1, [None], "images: found 1, expected 2, one per camera of the rig"),
     (1, [None, None], "images: found none, expected the image of at least one camera"),
+    (1, 5, "images: found int 5, expected a list of arrays, one per camera of the rig"),
+    (1, "a.png", "images: found str 'a.png', expected a list of arrays, one per camera of the rig"),
+    (None, [np.zeros((240, 376), np.uint8)] * 2, "stamps: found NoneType, expected an integer number of nanoseconds, "
+     "or a list of them"),
 ]  # fmt: skip
 
 
@@ -126,6 +130,22 @@ def test_wrong_settings_are_errors(recording):
     with pytest.raises(bslam.Error, match="localize_only"):
         bslam.System(rig, localize_only=True)
     assert {s.name: s for s in bslam.settings()}["features.per_image"].expected.startswith("an integer in")
+
+
+def test_arguments_of_other_types_are_errors_in_one_line(recording):
+    rig = bslam.Rig.load(recording.folder)
+    cases = [
+        (("rig.yaml",), {}, "rig: found str 'rig.yaml', expected a Rig; Rig.load(path) reads a calibration"),
+        ((None,), {}, "rig: found None, expected a Rig; Rig.load(path) reads a calibration"),
+        ((rig, 3), {}, "mode: found int 3, expected sequential, lagged or parallel"),
+        ((rig,), {"seed": "one"}, "seed: found str 'one', expected an integer"),
+        ((rig,), {"settings": ["seed"]}, "settings: found list of 1, expected a dict of names and values"),
+        ((rig,), {"load_map": 7}, "load_map: found int 7, expected the name of a file"),
+    ]
+    for arguments, options, text in cases:
+        with pytest.raises(bslam.Error) as error:
+            bslam.System(*arguments, **options)
+        assert str(error.value) == "System: " + text
 
 
 def test_other_threads_run_during_process(system, recording):

@@ -1,50 +1,31 @@
 #include "adjustment/bundle_problem.h"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 #include <tuple>
 #include <utility>
+
+#include "adjustment/landmark_keypoints.h"
 
 namespace bslam::adjustment {
 namespace {
 
-constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
-
 // Adds the observations of one landmark, unless fewer than two keyframes of the problem observe it: such a landmark
-// does not constrain the poses. `pose_index`: as index_by_keyframe.
+// does not constrain the poses. `pose_index`: as index_by_keyframe. `keypoints`: memory for those of the landmark.
 void add_landmark(const map::BundledMap& map, LandmarkId id, const std::vector<int>& pose_index,
-                  const feature::FeatureModel& features, BundleProblem& selected) {
+                  const feature::FeatureModel& features, std::vector<LandmarkKeypoint>& keypoints,
+                  BundleProblem& selected) {
   const auto observations = map.observations(id);
   const auto seen = std::count_if(observations.begin(), observations.end(),
                                   [&](const map::Observation& o) { return pose_index[o.keyframe.index()] >= 0; });
   if (seen < 2) return;
   const int point = static_cast<int>(selected.landmarks.size());
-  std::size_t reference = kNone;
-  float min_sigma = std::numeric_limits<float>::infinity();  // among observations aligned to the reference patch
-  for (const map::Observation& o : observations) {
-    const int pose = pose_index[o.keyframe.index()];
-    if (pose < 0) continue;
-    const frame::BundledFrame& frame = *map.keyframe(o.keyframe).frame;
-    for (const frame::KeypointRef r : frame.bundled.keypoints(o.feature)) {
-      const feature::Keypoints& keypoints = frame.keypoints(r.camera);
-      const std::size_t k = r.keypoint.index();
-      const double detected = features.sigma(keypoints.level[k]);
-      const float sigma = o.aligned ? keypoints.sigma[k] : static_cast<float>(detected);
-      if (o.aligned && map.landmark(id).reference == map::LandmarkReference{o.keyframe, r}) {
-        reference = selected.problem.observations.size();
-      } else if (o.aligned) {
-        min_sigma = std::min(min_sigma, sigma);
-      }
-      selected.problem.observations.push_back({pose, point, r.camera, keypoints.pixel[k], sigma});
-      selected.sources.push_back({id, o.keyframe});
-    }
+  const auto wanted = [&](KeyframeId k) { return pose_index[k.index()] >= 0; };
+  landmark_keypoints(map, id, wanted, features, keypoints);
+  for (const LandmarkKeypoint& k : keypoints) {
+    selected.problem.observations.push_back(
+        {pose_index[k.keyframe.index()], point, k.keypoint.camera, k.pixel, k.sigma});
+    selected.sources.push_back({id, k.keyframe});
   }
-  // The reference keypoint defines the landmark, so its detection error is not an error of the observation. It gets the
-  // smallest sigma of the keypoints aligned to it, if that is smaller than its own.
-  if (reference != kNone)
-    selected.problem.observations[reference].sigma =
-        std::min(selected.problem.observations[reference].sigma, min_sigma);
   selected.landmarks.push_back(id);
   selected.problem.points.push_back(map.landmark(id).position);
 }
@@ -110,7 +91,8 @@ BundleProblem build_problem(const map::BundledMap& map, const Selection& selecti
   selected.problem.motion = motions(map, selected.keyframes);
   selected.problem.twist = twists(map, selected.keyframes);
   const std::vector<int> pose_index = index_by_keyframe(map, selected.keyframes);
-  for (const LandmarkId l : selection.landmarks) add_landmark(map, l, pose_index, features, selected);
+  std::vector<LandmarkKeypoint> keypoints;
+  for (const LandmarkId l : selection.landmarks) add_landmark(map, l, pose_index, features, keypoints, selected);
   return selected;
 }
 

@@ -49,6 +49,7 @@ void Notifier::report_status(const FrameResult& frame) {
 
 void Notifier::report_withdrawal(const FrameResult& frame) {
   if (!frame.map_withdrawn) return;
+  loops_ = 0;  // its loops are forgotten
   log(LogLevel::kWarning, fmt::format("{:.3f} s: the initial map was wrong; it and all poses so far are discarded",
                                       to_seconds(frame.time_ns)));
 }

@@ -117,8 +117,16 @@ std::string json_text(const TrajectoryEvaluation& e) {
         {"count", e.rpe.translation_m.count}}},
       {"scale", e.scale ? nlohmann::ordered_json(*e.scale) : nlohmann::ordered_json(nullptr)},
       {"coverage", number(e.coverage)},
+      {"coverage_of_part", number(e.coverage_of_part)},
       {"gt_length_m", number(e.gt_length_m)}};
   return json.dump(2) + "\n";
+}
+
+// A path of a part of the recording covers little of the ground truth although no frame was lost.
+std::string coverage_text(const TrajectoryEvaluation& e) {
+  const std::string all = fmt::format("{:.2f} %", 100.0 * e.coverage),
+                    part = fmt::format("{:.2f} %", 100.0 * e.coverage_of_part);
+  return all == part ? all : fmt::format("{}; from the first to the last pose {}", all, part);
 }
 
 std::string table_text(const TrajectoryEvaluation& e, const EvalArguments& arguments) {
@@ -135,8 +143,7 @@ std::string table_text(const TrajectoryEvaluation& e, const EvalArguments& argum
          row(fmt::format("RPE over {:g} s, rotation", e.rpe.delta_s), errors(e.rpe.rotation_deg, "deg")) +
          row("alignment", arguments.align) +
          row("scale of best fit", e.scale ? fmt::format("{:.6f}", *e.scale) : "not determined") +
-         row("coverage", fmt::format("{:.2f} %", 100.0 * e.coverage)) +
-         row("ground truth, length", fmt::format("{:.3f} m", e.gt_length_m));
+         row("coverage", coverage_text(e)) + row("ground truth, length", fmt::format("{:.3f} m", e.gt_length_m));
 }
 
 // Tools such as evo_ape take the ground truth first.

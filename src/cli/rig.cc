@@ -110,7 +110,7 @@ void add_info(CLI::App& rig, int& exit_status) {
   session::RigReportRequest* const request = &arguments->report;
   CLI::App* info = rig.add_subcommand(
       "info", "print cameras, fields of view, baselines and overlaps, and warn about likely mistakes");
-  info->add_option("FILE", request->file, "a calibration, or the folder of a data set")->required();
+  info->add_option("FILE", request->file, "a calibration, the folder of a data set, or a saved map")->required();
   info->add_flag("--json", request->json, "print JSON");
   info->add_option("--svg", request->svg, "write a drawing of the rig from above and from the side to this SVG file");
   info->add_option("--images", request->images, "test the extrinsics against the images of this data set");

@@ -83,8 +83,11 @@ Status convert_time_stamps(const TimeStampOptions& options, const std::string& s
   for (image_files::ImageFile& image : images) {
     const TimeNs stamp = image.time_ns;
     if (static_cast<double>(stamp) * unit_ns > static_cast<double>(kMaxTime)) {
-      return Error{source, options.rate_hz ? "--rate" : "--stamp-unit", fmt::format("time stamp {}", stamp),
-                   options.rate_hz ? "numbers of images" : "time stamps in a larger unit than nanoseconds"};
+      return Error{
+          source, options.rate_hz ? "--rate" : "--stamp-unit",
+          fmt::format("time stamp {}, which is too large for this {}", stamp, options.rate_hz ? "rate" : "unit"),
+          options.rate_hz ? "numbers of images; time stamps in nanoseconds need no option"
+                          : "time stamps in this unit; those in nanoseconds need no option"};
     }
     // Whole units are multiplied exactly; a frame rate rounds every time by itself, so that errors do not add up.
     image.time_ns = options.unit_ns ? stamp * *options.unit_ns : std::llround(static_cast<double>(stamp) * unit_ns);

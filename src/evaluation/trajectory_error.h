@@ -59,6 +59,7 @@ struct TrajectoryEvaluation {
   // positions do not determine it, because one trajectory is motionless.
   std::optional<double> scale;
   double coverage = 0.0;          // see `coverage`
+  double coverage_of_part = 0.0;  // the same of the ground truth from the first to the last estimated pose
   double gt_length_m = 0.0;       // path length of the whole ground truth
   geometry::Sim3 T_gt_estimate;   // the alignment that was applied
   Trajectory aligned_estimate;    // all poses of the estimate, in the world frame of the ground truth

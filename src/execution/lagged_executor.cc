@@ -42,9 +42,7 @@ class LaggedExecutor : public StageExecutor {
   map::MapSnapshot begin_frame(FrameId frame) override {
     rethrow();
     ++now_;
-    for (const Stage stage : kStages) {
-      const auto& running = queue(stage).running;
-      while (running && now_ >= running->started + lag(running->task)) finish_running(stage);
+    while (finish_due()) {
     }
     return gate_.begin_frame(frame);
   }
@@ -151,11 +149,22 @@ class LaggedExecutor : public StageExecutor {
     changed_.notify_all();
   }
 
+  // Commits the results that are due at this frame, by stage. Returns false if none was: a task that a commit has
+  // started may be due at once, also one of an earlier stage.
+  bool finish_due() {
+    bool any = false;
+    for (const Stage stage : kStages) {
+      const auto& running = queue(stage).running;
+      for (; running && now_ >= running->started + lag(running->task); any = true) finish_running(stage);
+    }
+    return any;
+  }
+
   // Waits for the running task of a stage and commits it. Then starts the tasks that follow and the next one of the
   // stage. A stopped task is only removed. It stays in the queue until then, so that interrupt() can still stop it.
   void finish_running(Stage stage) {
     const std::shared_ptr<Job> job = queue(stage).running;
-    const CommitOutcome outcome = wait_for(*job) ? commit_result(*job) : CommitOutcome::kDiscarded;
+    const CommitOutcome outcome = wait_for(*job) ? commit_result(*job) : CommitOutcome::kStopped;
     leave(stage);
     if (is_repeated(stage, outcome)) queue(stage).waiting.push_front(job->task);
     if (outcome == CommitOutcome::kCommitted) {
@@ -178,9 +187,19 @@ class LaggedExecutor : public StageExecutor {
       fail(job.failure);
       rethrow();
     }
-    for (const Stage s : superseded_by(job.task.stage, job.result, *gate_.newest())) supersede(s);
+    const Superseded tasks = superseded_by(job.task.stage, job.result, *gate_.newest());
+    for (const Stage s : tasks.dropped) queue(s).waiting.clear();
+    for (const Stage s : tasks.dropped) stop_running(s);
+    std::vector<StageTask> again;
+    for (const Stage s : tasks.restarted) {
+      if (const auto stopped = stop_running(s)) again.push_back(stopped->task);
+    }
     const CommitOutcome outcome = gate_.commit_stage(job.task, job.base->version(), std::move(job.result), stop);
     if (!job.observed) observe(setup_, {job.task, job.ms, outcome == CommitOutcome::kCommitted});
+    for (const StageTask& task : again) {
+      queue(task.stage).waiting.push_front(task);
+      start_next(task.stage);
+    }
     return outcome;
   }
 
@@ -190,18 +209,19 @@ class LaggedExecutor : public StageExecutor {
     return std::exchange(queue(stage).running, nullptr);
   }
 
-  // Drops the waiting tasks of a stage and stops its running one.
-  void supersede(Stage stage) {
-    queue(stage).waiting.clear();
-    const std::shared_ptr<Job> job = leave(stage);
-    if (!job) return;
+  // Stops the running task of a stage and removes it from its queue; its result is never used. Returns null if none is
+  // running.
+  std::shared_ptr<Job> stop_running(Stage stage) {
+    std::shared_ptr<Job> job = leave(stage);
+    if (!job) return nullptr;
     {
       const std::lock_guard lock(mutex_);
       std::erase(worker(stage).queue, job);
       job->stop.request_stop();
-      if (!job->done || job->observed) return;  // its worker reports it
+      if (!job->done || job->observed) return job;  // its worker reports it
     }
     observe(setup_, {job->task, job->ms, false});
+    return job;
   }
 
   // The functions below are called by a worker's thread.

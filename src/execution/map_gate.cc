@@ -34,10 +34,10 @@ map::CommitReport MapGate::commit(JournalStep step, map::MapDraft draft) {
 
 CommitOutcome MapGate::commit_stage(StageTask& task, MapVersion base, StageResult result, const std::stop_token& stop) {
   const std::lock_guard order(order_);
-  if (stop.stop_requested()) return CommitOutcome::kDiscarded;
+  if (stop.stop_requested()) return CommitOutcome::kStopped;
   if (!result.draft) {
     append({journal_step(task.stage), task.input(), base, std::nullopt});
-    return CommitOutcome::kDiscarded;
+    return CommitOutcome::kUnchanged;
   }
   BSLAM_ASSERT(result.draft->map().version() == base, "a stage's draft must be based on the version passed to it");
   const map::CommitReport report = publish(journal_step(task.stage), task.input(), std::move(*result.draft));

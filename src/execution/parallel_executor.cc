@@ -74,6 +74,7 @@ class ParallelExecutor : public StageExecutor {
     // Stop source of the running task, until the task that follows it is enqueued.
     std::optional<std::stop_source> running;
     StageTask running_task;  // if one is running
+    bool restart = false;    // the running task was stopped and must be run again
   };
 
   StageQueue& queue(Stage stage) { return queues_[static_cast<std::size_t>(stage)]; }
@@ -101,9 +102,16 @@ class ParallelExecutor : public StageExecutor {
     });
   }
 
-  void drop(StageQueue& q) {
+  static void drop(StageQueue& q) {
     q.waiting.clear();
+    q.restart = false;
     if (q.running) q.running->request_stop();
+  }
+
+  static void restart(StageQueue& q) {
+    if (!q.running || q.running->stop_requested()) return;
+    q.restart = true;
+    q.running->request_stop();
   }
 
   // Ends every wait, because no task will be run any more.
@@ -137,14 +145,16 @@ class ParallelExecutor : public StageExecutor {
   void run_tasks(Stage stage) {
     std::stop_token stop;
     while (std::optional<StageTask> task = take(stage, stop)) {
-      bool committed = false;
-      std::exception_ptr failure;
-      try {
-        committed = run(*task, stop);
-      } catch (...) {
-        failure = std::current_exception();
+      for (bool done = false; !done;) {
+        CommitOutcome outcome = CommitOutcome::kStopped;
+        std::exception_ptr failure;
+        try {
+          outcome = run(*task, stop);
+        } catch (...) {
+          failure = std::current_exception();
+        }
+        done = finish(*task, outcome, failure, stop);
       }
-      finish(*task, committed, failure, stop);
     }
   }
 
@@ -162,43 +172,52 @@ class ParallelExecutor : public StageExecutor {
     return task;
   }
 
-  void finish(const StageTask& task, bool committed, const std::exception_ptr& failure, const std::stop_token& stop) {
+  // Ends a run of a task. If the task must be run again, returns false and replaces its stop token.
+  bool finish(const StageTask& task, CommitOutcome outcome, const std::exception_ptr& failure, std::stop_token& stop) {
     std::unique_lock lock(mutex_);
+    StageQueue& q = queue(task.stage);
+    if (q.restart && outcome == CommitOutcome::kStopped) {
+      q.restart = false;
+      stop = q.running.emplace().get_token();
+      return false;
+    }
     if (failure && !stop.stop_requested()) {  // failures of a stopped task are ignored
       failure_ = failure;
       close();
     }
-    if (committed) {
+    if (outcome == CommitOutcome::kCommitted) {
       for (const StageTask& next : following(task, *gate_.newest(), setup_.functions)) push(next, lock);
     }
-    queue(task.stage).running.reset();
+    q.running.reset();
+    q.restart = false;
     changed_.notify_all();
+    return true;
   }
 
-  // Drops the tasks of stages that a commit supersedes. Called with the commit and before any other, so that no result
-  // of these tasks is committed after it.
-  void drop(const std::vector<Stage>& stages) {
+  // Stops the tasks that a commit supersedes. Called with the commit and before any other, so that no result of these
+  // tasks is committed after it.
+  void supersede(const Superseded& tasks) {
     const std::lock_guard lock(mutex_);
-    for (const Stage stage : stages) drop(queue(stage));
-    changed_.notify_all();  // their queues have space
+    for (const Stage stage : tasks.dropped) drop(queue(stage));
+    for (const Stage stage : tasks.restarted) restart(queue(stage));
+    changed_.notify_all();  // queues have space
   }
 
-  // Returns true if the result was committed.
-  bool run(StageTask& task, const std::stop_token& stop) {
+  CommitOutcome run(StageTask& task, const std::stop_token& stop) {
     CommitOutcome outcome;
     do {
       outcome = run_once(task, stop);
     } while (is_repeated(task.stage, outcome));
-    return outcome == CommitOutcome::kCommitted;
+    return outcome;
   }
 
   CommitOutcome run_once(StageTask& task, const std::stop_token& stop) {
     const Stopwatch watch;
     const map::MapSnapshot base = gate_.newest();
     StageResult result = setup_.functions[task.stage](task, base, stop);
-    result.committed = [this, stages = superseded_by(task.stage, result, *base),
+    result.committed = [this, tasks = superseded_by(task.stage, result, *base),
                         then = std::move(result.committed)](const map::CommitReport& report) {
-      drop(stages);
+      supersede(tasks);
       if (then) then(report);
     };
     const CommitOutcome outcome = gate_.commit_stage(task, base->version(), std::move(result), stop);

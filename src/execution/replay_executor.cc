@@ -86,7 +86,7 @@ class ReplayExecutor : public StageExecutor {
   void expect_nothing_waits() const {
     for (const Stage stage : kStages) {
       const auto& tasks = waiting_[static_cast<std::size_t>(stage)];
-      if (!tasks.empty() && !can_be_superseded(stage)) fail(step_text(journal_step(stage), tasks.front().input()));
+      if (!tasks.empty() && !can_be_dropped(stage)) fail(step_text(journal_step(stage), tasks.front().input()));
     }
   }
 
@@ -101,7 +101,7 @@ class ReplayExecutor : public StageExecutor {
 
   void run(StageTask task) {
     std::deque<StageTask>& tasks = waiting(task.stage);
-    while (can_be_superseded(task.stage) && !tasks.empty() && tasks.front() != task) tasks.pop_front();
+    while (can_be_dropped(task.stage) && !tasks.empty() && tasks.front() != task) tasks.pop_front();
     const auto waiting_task = std::ranges::find(tasks, task);
     if (waiting_task == tasks.end() ||
         !std::all_of(tasks.begin(), waiting_task, [&](const StageTask& ahead) { return runs_later(ahead); }))

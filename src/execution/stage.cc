@@ -93,23 +93,24 @@ std::vector<StageTask> following(const StageTask& task, const map::BundledMap& n
 
 namespace {
 
-// The stages whose tasks a result of `stage` supersedes. `corrects`: it moves the map.
-std::vector<Stage> superseded(Stage stage, bool corrects) {
-  if (stage == Stage::kCalibrate) return {Stage::kGlobal};
-  if (stage != Stage::kLoop) return {};
-  return corrects ? std::vector{Stage::kCalibrate, Stage::kGlobal} : std::vector{Stage::kGlobal};
+// The tasks that a result of `stage` supersedes. `corrects`: it moves the map.
+Superseded superseded(Stage stage, bool corrects) {
+  Superseded out;
+  if (stage == Stage::kCalibrate || stage == Stage::kLoop) out.dropped = {Stage::kGlobal};
+  if (stage == Stage::kLoop && corrects) out.restarted = {Stage::kCalibrate};
+  return out;
 }
 
 }  // namespace
 
-std::vector<Stage> superseded_by(Stage stage, const StageResult& result, const map::BundledMap& newest) {
+Superseded superseded_by(Stage stage, const StageResult& result, const map::BundledMap& newest) {
   if (!result.draft || result.draft->superseded(newest)) return {};
   return superseded(stage, result.draft->corrects());
 }
 
-bool can_be_superseded(Stage stage) {
+bool can_be_dropped(Stage stage) {
   return std::ranges::any_of(kStages, [&](Stage by) {
-    const std::vector<Stage> dropped = superseded(by, true);
+    const std::vector<Stage> dropped = superseded(by, true).dropped;
     return std::ranges::find(dropped, stage) != dropped.end();
   });
 }

@@ -48,7 +48,8 @@ struct StageResult {
 // What became of the result of a task.
 enum class CommitOutcome {
   kCommitted,
-  kDiscarded,  // there was nothing to change, or a stop was requested
+  kUnchanged,  // there was nothing to change
+  kStopped,    // a stop was requested before; the journal has no entry
   kRejected,   // it corrects the map, and another correction has been committed since its base (map::MapDraft)
 };
 
@@ -85,22 +86,30 @@ bool before_first_calibration(KeyframeId keyframe, const map::BundledMap& map);
 // calibrations are waited for as well. `newest` is the newest version of the map.
 bool awaited(const StageTask& task, const map::BundledMap& newest);
 
-// The stages whose waiting and running tasks are dropped when a result of `stage` is committed; `newest` is the newest
-// version before the commit, or the base of the result if they are dropped only once it was committed. After a loop
-// closure or a calibration, a global adjustment of an earlier version is useless; they adjust the map themselves or
-// another adjustment follows. A loop closure also supersedes a calibration of an earlier version if it moves the map
-// and does not merely fuse landmarks. Returns none if nothing will be committed.
-std::vector<Stage> superseded_by(Stage stage, const StageResult& result, const map::BundledMap& newest);
+// What a commit does to the tasks of other stages.
+struct Superseded {
+  std::vector<Stage> dropped;    // waiting and running tasks are dropped
+  std::vector<Stage> restarted;  // the running task is stopped and run again on the newest version
+  friend bool operator==(const Superseded&, const Superseded&) = default;
+};
+
+// The tasks that are superseded when a result of `stage` is committed; `newest` is the newest version before the
+// commit, or the base of the result if they are superseded only once it was committed. After a loop closure or a
+// calibration, a global adjustment of an earlier version is useless; they adjust the map themselves or another
+// adjustment follows. If a loop closure moves the map and does not merely fuse landmarks, the result of a running
+// calibration will be rejected. No other task estimates that calibration: it is run again, and waiting ones stay.
+// Returns none if nothing will be committed.
+Superseded superseded_by(Stage stage, const StageResult& result, const map::BundledMap& newest);
 
 // Whether tasks of a stage can be dropped because of a result of another stage; a dropped task leaves no entry in the
 // journal.
-bool can_be_superseded(Stage stage);
+bool can_be_dropped(Stage stage);
 
 // Report of one run of a stage for the observer.
 struct StageRun {
   StageTask task;
   double ms = 0;
-  bool committed = false;  // false: there was nothing to change, or it was superseded
+  bool committed = false;  // false: there was nothing to change, or it was superseded or rejected
 };
 
 // Must be thread-safe: called from any thread, also concurrently.

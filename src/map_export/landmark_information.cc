@@ -3,28 +3,40 @@
 #include <Eigen/Cholesky>
 #include <limits>
 
-namespace bslam::map_export {
+#include "adjustment/landmark_keypoints.h"
+#include "solver/reprojection.h"
 
-Eigen::Matrix3d keypoint_information(const map::BundledMap& map, KeyframeId k, LandmarkId l, FeatureId f) {
-  const Eigen::Vector3d& p = map.landmark(l).position;
+namespace bslam::map_export {
+namespace {
+
+// The sum over the keypoints of selected keyframes that are `wanted`.
+template <class Wanted>
+Eigen::Matrix3d information_of(const Selection& selection, LandmarkId l, const Wanted& wanted) {
+  const map::BundledMap& map = *selection.map;
+  const auto selected = [&](KeyframeId k) { return selection.selected[k.index()] != 0; };
+  std::vector<adjustment::LandmarkKeypoint> keypoints;
+  adjustment::landmark_keypoints(map, l, selected, {.pyramid = map.pyramid()}, keypoints);
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
-  for (const frame::KeypointRef r : map.keyframe(k).frame->bundled.keypoints(f)) {
-    const geometry::SE3 T_cam_world = map.cam_from_world(k, r);
-    const auto projection = map.rig().camera(r.camera).project_with_jacobian(T_cam_world * p);
-    if (!projection) continue;
-    const double sigma = map.keypoints(k, r.camera).sigma[r.keypoint.index()];
-    const Eigen::Matrix<double, 2, 3> J = projection->jacobian * T_cam_world.matrix3() / sigma;
+  for (const adjustment::LandmarkKeypoint& k : keypoints) {
+    if (!wanted(k.keyframe)) continue;
+    const geometry::SE3 T_cam_world = map.cam_from_world(k.keyframe, k.keypoint);
+    const auto residual = solver::residual(map.rig().camera(k.keypoint.camera).model,
+                                           T_cam_world * map.landmark(l).position, k.pixel.cast<double>());
+    if (!residual) continue;
+    const Eigen::Matrix<double, 2, 3> J = residual->J * T_cam_world.matrix3() / double{k.sigma};
     sum += J.transpose() * J;
   }
   return sum;
 }
 
+}  // namespace
+
+Eigen::Matrix3d landmark_information(const Selection& selection, LandmarkId l, KeyframeId k) {
+  return information_of(selection, l, [&](KeyframeId other) { return other == k; });
+}
+
 Eigen::Matrix3d landmark_covariance(const Selection& selection, LandmarkId l) {
-  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
-  for (const map::Observation& o : selection.map->observations(l)) {
-    if (selection.selected[o.keyframe.index()])
-      information += keypoint_information(*selection.map, o.keyframe, l, o.feature);
-  }
+  const Eigen::Matrix3d information = information_of(selection, l, [](KeyframeId) { return true; });
   const Eigen::LDLT<Eigen::Matrix3d> ldlt(information);
   const bool determined = ldlt.info() == Eigen::Success && ldlt.vectorD().minCoeff() > 0;
   if (!determined) return Eigen::Matrix3d::Constant(std::numeric_limits<double>::infinity());

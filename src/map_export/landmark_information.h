@@ -1,4 +1,5 @@
-// Information and covariance of landmark positions.
+// Information and covariance of landmark positions. The keypoints have the standard deviations of adjustments
+// (adjustment/landmark_keypoints.h), with that of the detector by default, which is not part of a map.
 #pragma once
 
 #include <Eigen/Core>
@@ -8,8 +9,8 @@
 namespace bslam::map_export {
 
 // Information (inverse covariance, 1 / unit^2) about the position of a landmark, in the world, from the keypoints of
-// one feature of a keyframe whose pose is constant.
-Eigen::Matrix3d keypoint_information(const map::BundledMap& map, KeyframeId k, LandmarkId l, FeatureId f);
+// one selected keyframe whose pose is constant.
+Eigen::Matrix3d landmark_information(const Selection& selection, LandmarkId l, KeyframeId k);
 
 // Covariance of the position of a landmark from all its observations in selected keyframes with constant poses.
 // Infinite if they do not determine it.

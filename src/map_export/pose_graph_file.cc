@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "geometry/so3.h"
+#include "map/keyframe_landmarks.h"
 #include "map_export/landmark_information.h"
 
 namespace bslam::map_export {
@@ -17,35 +18,28 @@ namespace {
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 using Matrix36d = Eigen::Matrix<double, 3, 6>;
 
-// The landmarks that a keyframe observes, in order of id.
-std::vector<std::pair<LandmarkId, FeatureId>> observed_landmarks(const map::BundledKeyframe& keyframe) {
-  std::vector<std::pair<LandmarkId, FeatureId>> observed;
-  for (std::size_t f = 0; f < keyframe.landmarks.size(); ++f)
-    if (keyframe.landmarks[f].valid()) observed.emplace_back(keyframe.landmarks[f], FeatureId(f));
-  std::ranges::sort(observed);
-  return observed;
+// The landmarks that both keyframes observe, in order of id.
+std::vector<LandmarkId> common_landmarks(const map::BundledMap& map, KeyframeId i, KeyframeId j) {
+  std::vector<LandmarkId> common;
+  std::ranges::set_intersection(map::landmarks_of(map, i), map::landmarks_of(map, j), std::back_inserter(common));
+  return common;
 }
 
 // Information about T_i_j, in the order and parametrisation of g2o, with keyframe i constant.
-Matrix6d relative_information(const map::BundledMap& map, KeyframeId i, KeyframeId j) {
+Matrix6d relative_information(const Selection& selection, KeyframeId i, KeyframeId j) {
+  const map::BundledMap& map = *selection.map;
   const geometry::SE3& T_j_world = map.keyframe(j).T_rig_world;
   const Eigen::Matrix3d R_world_j = T_j_world.matrix3().transpose();
-  const auto seen_by_i = observed_landmarks(map.keyframe(i)), seen_by_j = observed_landmarks(map.keyframe(j));
   Matrix6d information = Matrix6d::Zero();
-  for (auto a = seen_by_i.begin(), b = seen_by_j.begin(); a != seen_by_i.end() && b != seen_by_j.end();) {
-    if (a->first != b->first) {
-      ++(a->first < b->first ? a : b);
-      continue;
-    }
-    const Eigen::Matrix3d W_i = keypoint_information(map, i, a->first, a->second);
-    const Eigen::Matrix3d W_j = keypoint_information(map, j, b->first, b->second);
+  for (const LandmarkId l : common_landmarks(map, i, j)) {
+    const Eigen::Matrix3d W_i = landmark_information(selection, l, i);
+    const Eigen::Matrix3d W_j = landmark_information(selection, l, j);
     // X_j <- X_j exp(t, q) moves the point, in the frame of j, by -t - 2 q x p.
     Matrix36d motion;
     motion.leftCols<3>() = -R_world_j;
-    motion.rightCols<3>() = 2.0 * R_world_j * geometry::skew(T_j_world * map.landmark(a->first).position);
+    motion.rightCols<3>() = 2.0 * R_world_j * geometry::skew(T_j_world * map.landmark(l).position);
     const Eigen::Matrix3d W = W_i + W_j + 1e-12 * (W_i + W_j).trace() * Eigen::Matrix3d::Identity();
     information += motion.transpose() * (W_j - W_j * W.ldlt().solve(W_j)) * motion;  // without the point
-    ++a, ++b;
   }
   return 0.5 * (information + information.transpose());
 }
@@ -88,7 +82,7 @@ PoseGraphFile g2o_text(const Selection& selection, int min_shared) {
   }
   file.text += fmt::format("FIX {}\n", selection.keyframes.front().value());
   for (const auto& [i, j] : edges_of(selection, min_shared)) {
-    Matrix6d information = relative_information(map, i, j);
+    Matrix6d information = relative_information(selection, i, j);
     if (!determines_pose(information)) information += kWeakInformation * Matrix6d::Identity();
     file.text += fmt::format("EDGE_SE3:QUAT {} {} {}", i.value(), j.value(),
                              pose_text(map.keyframe(i).T_rig_world * selection.world_from_rig(j)));

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <fstream>
 #include <utility>
 
 #include "base/atomic_file.h"
@@ -26,7 +27,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMaxRigBytes = std::size_t{1} << 22;
-constexpr const char* kSensor = "sensor.yaml";  // of a camera in EuRoC layout
+constexpr const char* kSensor = "sensor.yaml";      // of a camera in EuRoC layout
+constexpr std::string_view kMapBegin = "BSLAMMAP";  // docs/map_file.md
 
 Result<camera::RigReading> read_euroc_file(const fs::path& file, const std::string&) {
   const std::string folder = fs::absolute(file).parent_path().filename().string();
@@ -207,9 +209,17 @@ RigFormat format_of_output(const fs::path& out) {
   return out.extension() == ".json" ? RigFormat::kBasalt : RigFormat::kBslam;
 }
 
+bool is_saved_map(const fs::path& file) {
+  std::string begin(kMapBegin.size(), '\0');
+  std::ifstream stream(file, std::ios::binary);
+  return stream.read(begin.data(), static_cast<std::streamsize>(begin.size())) && begin == kMapBegin;
+}
+
 Result<RigFile> read_rig_file(const fs::path& path) {
   std::error_code error;
   if (fs::is_directory(path, error)) return read_folder(path);
+  if (is_saved_map(path))
+    return Error{path.string(), "", "a saved map", "a calibration; bslam rig info shows the cameras of a map"};
   auto text = read_text(path, kMaxRigBytes);
   if (!text) return text.error();
   std::string names;

@@ -33,6 +33,9 @@ struct RigFile {
   std::vector<std::string> notes;  // how ambiguous content of the file was interpreted
 };
 
+// Returns true if the file begins like a saved map, which is no calibration, but contains one.
+bool is_saved_map(const std::filesystem::path& file);
+
 // Reads a rig in any supported format, which is recognised by the content. If `path` is a folder, reads the calibration
 // in it, which may be an EuRoC or KITTI data set or a COLMAP rig. Errors name the file and the key: values that
 // make_camera rejects, missing and repeated keys, wrong types, YAML syntax, and, in the format of bslam, unknown keys.

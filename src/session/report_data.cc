@@ -127,7 +127,10 @@ ordered_json report_json(const SessionResult& result, const system::Config& conf
   ordered_json json = run_json(record, *result.map, result.rig ? *result.rig : result.map->rig(), result.trajectories,
                                source.dataset.first_time_ns, {}, source.up);
   json["command"] = source.command;
-  json["truth"] = report_truth(source.dataset, path, record.map.scale == "metric");
+  std::optional<TimeNs> last_ns;
+  if (!record.complete && !record.frames.empty())
+    last_ns = source.dataset.first_time_ns + from_seconds(record.frames.back().time_s);
+  json["truth"] = report_truth(source.dataset, path, record.map.scale == "metric", last_ns);
   json["settings"] = settings_json(config);
   return json;
 }

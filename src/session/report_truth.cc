@@ -29,13 +29,14 @@ std::optional<geometry::SE3> camera_in_truth_frame(const dataset::Dataset& datas
   return dataset.whole_rig->rig_from_cam(used);
 }
 
-// The true poses of camera 0 from the first to the last frame that was processed, with a margin of `tolerance_ns`.
-Trajectory truth_of_camera(const Trajectory& truth, const dataset::Dataset& dataset, const geometry::SE3& T_truth_cam0,
-                           TimeNs tolerance_ns) {
+// The true poses of camera 0 from the first frame to the last one that was processed, with a margin of `tolerance_ns`.
+Trajectory truth_of_camera(const Trajectory& truth, const dataset::Dataset& dataset, std::optional<TimeNs> last_ns,
+                           const geometry::SE3& T_truth_cam0, TimeNs tolerance_ns) {
   Trajectory kept;
   for (const evaluation::TimedPose& pose : truth) {
-    const bool outside = !dataset.frames.empty() && (pose.time_ns < dataset.frames.front().time_ns - tolerance_ns ||
-                                                     pose.time_ns > dataset.frames.back().time_ns + tolerance_ns);
+    const bool outside =
+        !dataset.frames.empty() && (pose.time_ns < dataset.frames.front().time_ns - tolerance_ns ||
+                                    pose.time_ns > last_ns.value_or(dataset.frames.back().time_ns) + tolerance_ns);
     if (!outside) kept.push_back(pose);
   }
   return moved_to_frame(kept, T_truth_cam0);
@@ -55,7 +56,8 @@ ordered_json true_path(const Trajectory& truth, const geometry::Sim3& T_gt_estim
 
 }  // namespace
 
-ordered_json report_truth(const dataset::Dataset& dataset, const Trajectory& path, bool metric) {
+ordered_json report_truth(const dataset::Dataset& dataset, const Trajectory& path, bool metric,
+                          std::optional<TimeNs> last_ns) {
   if (!dataset.ground_truth || path.empty()) return nullptr;
   const auto T_truth_cam0 = camera_in_truth_frame(dataset);
   if (!T_truth_cam0) return nullptr;
@@ -63,7 +65,7 @@ ordered_json report_truth(const dataset::Dataset& dataset, const Trajectory& pat
   if (!given) return {{"error", given.error().message()}};
   const evaluation::EvaluationOptions options{.align =
                                                   metric ? evaluation::AlignMode::kSe3 : evaluation::AlignMode::kSim3};
-  const Trajectory truth = truth_of_camera(*given, dataset, *T_truth_cam0, options.max_dt_ns);
+  const Trajectory truth = truth_of_camera(*given, dataset, last_ns, *T_truth_cam0, options.max_dt_ns);
   const auto found = evaluation::evaluate(path, truth, options);
   if (!found) return {{"error", found.error().found + "; expected " + found.error().expected}};
   std::vector<float> time, error;

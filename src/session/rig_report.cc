@@ -15,6 +15,7 @@
 #include "rig_formats/rig_file.h"
 #include "session/image_test.h"
 #include "session/late_camera_json.h"
+#include "storage/map_file.h"
 
 namespace bslam::session {
 namespace {
@@ -92,8 +93,13 @@ struct Calibration {
   bool of_recording = false;  // a bag, with its own calibration
 };
 
-// Reads a calibration file, or the calibration of a bag.
+// Reads a calibration file, or the calibration of a bag or of a saved map.
 Result<Calibration> read_calibration(const RigReportRequest& request) {
+  if (request.images.empty() && rig_formats::is_saved_map(request.file)) {
+    const auto map = storage::read_map(request.file);
+    if (!map) return map.error();
+    return Calibration{{map->map.rig(), rig_formats::RigFormat::kBslam, {}}, "saved map"};
+  }
   dataset::DatasetRequest recording = request.recording;
   recording.path = request.file;
   std::error_code error;

@@ -9,10 +9,10 @@
 namespace bslam::session {
 
 struct RigReportRequest {
-  std::string file;                        // a calibration, the folder of a data set, or a bag with CameraInfo
-  bool json = false;                       // text otherwise
-  std::string svg = {};                    // draw the rig into this file unless empty
-  std::string images = {};                 // test the extrinsics against this data set unless empty
+  std::string file;         // a calibration, the folder of a data set, a bag with CameraInfo, or a saved map
+  bool json = false;        // text otherwise
+  std::string svg = {};     // draw the rig into this file unless empty
+  std::string images = {};  // test the extrinsics against this data set unless empty
   dataset::DatasetRequest recording = {};  // how to read the data set; path and calibration are those above
 };
 

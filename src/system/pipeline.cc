@@ -162,7 +162,8 @@ void Pipeline::commit(tracking::TrackOutcome& tracked, execution::StageExecutor&
   tracking::ProposedEdit& edit = *tracked.edit;
   const map::CommitReport report = executor.commit(journal_step(edit.kind), std::move(edit.draft));
   tracker_.committed(report, tracked);
-  outcome.keyframes = report.keyframes;
+  for (const KeyframeId k : report.keyframes)
+    outcome.keyframes.push_back({k, report.published->keyframe(k).frame->time_ns});
   outcome.started_submap = edit.kind == tracking::ProposedEdit::Kind::kStart;
   if (outcome.started_submap) tracked.record.scale = report.published->scale();
   tracked.record.stages.back().ms += watch.ms();  // added to the time of the stage that proposed the edit

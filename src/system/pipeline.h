@@ -26,10 +26,15 @@ class Pipeline {
   Pipeline(const camera::Rig& rig, CamerasOfRun cameras, const Config& config, std::vector<image::Image> masks,
            std::unique_ptr<tracking::Relocaliser> relocaliser, KeyframeMaker* keyframe_maker);
 
+  struct AddedKeyframe {
+    KeyframeId id;
+    TimeNs time_ns = 0;  // of its frame, which is an earlier one for the first keyframe of a monocular initialisation
+  };
+
   struct Outcome {
     FrameRecord record;
     map::MapSnapshot seen;  // version of the map the frame was tracked in
-    std::vector<KeyframeId>
+    std::vector<AddedKeyframe>
         keyframes;  // added to the map, in order; the caller enqueues them for the background stages
     std::optional<FrameId>
         deferred;  // the frame was passed to the keyframe maker; the caller enqueues it for its stage

@@ -47,8 +47,9 @@ System::System(camera::Rig rig, Config config, Resources resources)
       first_keyframe_(resources.map ? resources.map->keyframe_slots() : 0),
       doubt_(resources.map ? std::nullopt : std::optional<tracking::MapDoubt>(run_rig_)),
       closer_(make_loop_closer(config_, resources.vocabulary)),
-      keyframe_maker_(rig_, config_, make_relocaliser(resources.vocabulary, config_),
-                      [this](const tracking::CreatedKeyframe& created, TimeNs time_ns) { note(created, time_ns); }),
+      keyframe_maker_(
+          rig_, config_, make_relocaliser(resources.vocabulary, config_),
+          [this](const tracking::CreatedKeyframe& created, TimeNs time_ns) { records_.add_created(created, time_ns); }),
       pipeline_(rig_, cameras_, config_, widened(std::move(resources.masks), cameras_, rig_.size()),
                 make_relocaliser(resources.vocabulary, config_), &keyframe_maker_),
       history_(resources.history),
@@ -57,15 +58,9 @@ System::System(camera::Rig rig, Config config, Resources resources)
       initial_rig_(store_.snapshot()->shared_rig()),
       gate_(store_, history_ == 0) {
   const map::MapSnapshot map = store_.snapshot();
-  for (const KeyframeId k : map->keyframe_ids()) set_keyframe_time(k, map->keyframe(k).frame->time_ns);
-  const auto note_loop = [this](const LoopRecord& loop) {
-    const std::lock_guard lock(records_mutex_);
-    loops_.push_back(loop);
-  };
-  const auto note_run = [this](const execution::StageRun& run) {
-    const std::lock_guard lock(records_mutex_);
-    stage_runs_.push_back({run, time_of(run.task)});
-  };
+  for (const KeyframeId k : map->keyframe_ids()) records_.set_keyframe_time(k, map->keyframe(k).frame->time_ns);
+  const auto note_loop = [this](const LoopRecord& loop) { records_.add_loop(loop); };
+  const auto note_run = [this](const execution::StageRun& run) { records_.add_stage_run(run); };
   execution::ExecutionSetup setup{make_stages(config_, keyframe_maker_, rig_, first_keyframe_, closer_, note_loop),
                                   config_.execution, note_run};
   executor_ = resources.replay ? execution::make_replay_executor(std::move(*resources.replay), gate_, std::move(setup))
@@ -74,7 +69,7 @@ System::System(camera::Rig rig, Config config, Resources resources)
 
 System::~System() = default;
 
-// Discards a wrong initialisation, including the poses it returned.
+// Discards a wrong initialisation, including the poses it returned and the loops in its map.
 void System::discard_map() {
   for (FrameRecord& record : frames_) {
     if (record.result.status != tracking::TrackStatus::kTracking) continue;
@@ -86,22 +81,15 @@ void System::discard_map() {
     record.relocalisation.reset();
     record.root = KeyframeId();
     record.keyframe = false;
+    record.created.reset();
   }
   early_.clear();
   pipeline_.restart();
   executor_->restart();
-  {
-    const std::lock_guard lock(records_mutex_);
-    created_.clear();
-  }
+  if (closer_) closer_->begin_path();  // no stage is running now
+  records_.discard_map();
   created_keyframes_.clear();
   frames_.back().map_withdrawn = true;
-}
-
-void System::set_keyframe_time(KeyframeId k, TimeNs time_ns) {
-  const std::lock_guard lock(records_mutex_);
-  if (keyframe_time_ns_.size() <= k.index()) keyframe_time_ns_.resize(k.index() + 1);
-  keyframe_time_ns_[k.index()] = time_ns;
 }
 
 Result<FrameRecord> System::process(const image::ImageBundle& images) {
@@ -115,10 +103,9 @@ Result<FrameRecord> System::process(const image::ImageBundle& images) {
   maps_started_ += outcome.started_submap;
   observed_ = std::move(outcome.observed);
   std::ranges::move(outcome.early, std::back_inserter(early_));
-  // A monocular initialisation adds two keyframes, both with the time of the second frame.
-  for (const KeyframeId k : outcome.keyframes) set_keyframe_time(k, outcome.record.result.time_ns);
+  for (const auto& [k, time_ns] : outcome.keyframes) records_.set_keyframe_time(k, time_ns);
   const Stopwatch watch;
-  for (const KeyframeId k : outcome.keyframes) executor_->enqueue(k);
+  for (const auto& added : outcome.keyframes) executor_->enqueue(added.id);
   if (outcome.deferred) enqueue(*outcome.deferred, outcome.record.result.time_ns);
   if ((outcome.deferred || !outcome.keyframes.empty()) && config_.mode != execution::Mode::kSequential) {
     outcome.record.stages.push_back({"wait", watch.ms()});
@@ -141,28 +128,14 @@ void System::set_reduction(int level) {
 
 void System::enqueue(FrameId frame, TimeNs time_ns) {
   if (executor_->over()) return keyframe_maker_.withdraw(frame);
-  {
-    const std::lock_guard lock(records_mutex_);
-    deferred_time_ns_[frame] = time_ns;
-  }
+  records_.add_deferred(frame, time_ns);
   executor_->enqueue({execution::Stage::kKeyframe, KeyframeId(), frame});
-}
-
-void System::note(const tracking::CreatedKeyframe& created, TimeNs time_ns) {
-  set_keyframe_time(created.keyframe, time_ns);
-  const std::lock_guard lock(records_mutex_);
-  created_.push_back(created);
 }
 
 // Marks the frames from which keyframes were created since the last call. Their poses become those of the keyframes.
 void System::mark_created_keyframes() {
-  std::vector<tracking::CreatedKeyframe> all;
-  {
-    const std::lock_guard lock(records_mutex_);
-    all.swap(created_);
-  }
   created_keyframes_.clear();
-  for (const tracking::CreatedKeyframe& created : all) {
+  for (const tracking::CreatedKeyframe& created : records_.take_created()) {
     const auto record = find_record(frames_, created.frame);
     if (record == frames_.end()) continue;
     record->keyframe = true;
@@ -174,15 +147,10 @@ void System::mark_created_keyframes() {
 // Drops the oldest records once there are twice as many as configured, so that the mean time per frame is constant.
 void System::bound_history() {
   if (history_ == 0 || frames_.size() < 2 * history_) return;
-  const std::lock_guard lock(records_mutex_);
-  if ((!deferred_time_ns_.empty() || !created_.empty()) && !executor_->over()) return;  // their frames will be marked
-  const auto drop_oldest = [this](auto& records) {
-    if (records.size() > history_)
-      records.erase(records.begin(), records.end() - static_cast<std::ptrdiff_t>(history_));
-  };
-  drop_oldest(frames_);
+  if (records_.creates_keyframes() && !executor_->over()) return;  // their frames will be marked
+  frames_.erase(frames_.begin(), frames_.end() - static_cast<std::ptrdiff_t>(history_));
   std::erase_if(early_, [&](const auto& early) { return early.frame->id < frames_.front().result.frame; });
-  drop_oldest(stage_runs_);
+  records_.keep_latest(history_);
 }
 
 void System::finish() {
@@ -246,29 +214,6 @@ camera::Rig System::rig() const { return map::cameras_of(snapshot()->rig(), came
 void System::interrupt() {
   interruption_.request_stop();
   executor_->interrupt();
-}
-
-std::vector<StageRecord> System::stage_runs() const {
-  const std::lock_guard lock(records_mutex_);
-  return stage_runs_;
-}
-
-std::vector<LoopRecord> System::loops() const {
-  const std::lock_guard lock(records_mutex_);
-  return loops_;
-}
-
-// Time of the frame that caused a task. Requires records_mutex_.
-TimeNs System::time_of(const execution::StageTask& task) {
-  if (task.stage != execution::Stage::kKeyframe) return keyframe_time_ns_[task.keyframe.index()];
-  const TimeNs time_ns = deferred_time_ns_.at(task.frame);
-  deferred_time_ns_.erase(task.frame);
-  return time_ns;
-}
-
-TimeNs System::keyframe_time(KeyframeId k) const {
-  const std::lock_guard lock(records_mutex_);
-  return keyframe_time_ns_[k.index()];
 }
 
 std::vector<SubmapTrajectory> System::trajectories() const {

@@ -1,9 +1,7 @@
 // The SLAM system: computes poses and a map from images. Owns the map and the threads.
 #pragma once
 
-#include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <stop_token>
 #include <utility>
@@ -17,16 +15,10 @@
 #include "system/config.h"
 #include "system/input_check.h"
 #include "system/pipeline.h"
-#include "system/stages.h"
+#include "system/run_records.h"
 #include "tracking/map_doubt.h"
 
 namespace bslam::system {
-
-// One run of a background stage.
-struct StageRecord {
-  execution::StageRun run;
-  TimeNs time_ns = 0;  // time of its keyframe
-};
 
 // Optional input of a run.
 struct Resources {
@@ -100,7 +92,7 @@ class System {
   std::vector<tracking::ObservedKeypoints> take_observed_keypoints() { return std::exchange(observed_, {}); }
   // Moves the frames out; frames() is empty afterwards.
   std::vector<FrameRecord> take_frames() { return std::exchange(frames_, {}); }
-  std::vector<StageRecord> stage_runs() const;
+  std::vector<StageRecord> stage_runs() const { return records_.stage_runs(); }
   // The journal for a replay; empty if the history is bounded.
   execution::Journal journal() const { return gate_.journal(); }
   double final_adjustment_ms() const { return final_adjustment_ms_; }
@@ -113,8 +105,9 @@ class System {
   // To be called after finish().
   SystemMemory memory() const;
 
-  std::vector<LoopRecord> loops() const;
-  TimeNs keyframe_time(KeyframeId k) const;
+  // Those in the map; a map that is discarded takes its loops with it.
+  std::vector<LoopRecord> loops() const { return records_.loops(); }
+  TimeNs keyframe_time(KeyframeId k) const { return records_.keyframe_time(k); }
 
   // Poses of all frames() that have one, in the current map: one trajectory for each submap with poses, the longest
   // first.
@@ -129,10 +122,7 @@ class System {
   void locate_early_frames();
   void calibrate(map::MapDraft& draft, const std::stop_token& stop);
   void enqueue(FrameId frame, TimeNs time_ns);
-  void note(const tracking::CreatedKeyframe& created, TimeNs time_ns);
   void mark_created_keyframes();
-  TimeNs time_of(const execution::StageTask& task);
-  void set_keyframe_time(KeyframeId k, TimeNs time_ns);
 
   const CamerasOfRun cameras_;  // indices in rig_
   const camera::Rig rig_;       // rig of the map, with the given calibration
@@ -149,12 +139,7 @@ class System {
   std::vector<FrameRecord> created_keyframes_;
   std::vector<tracking::ObservedKeypoints> observed_;
   std::vector<tracking::BetweenKeyframes> early_;  // frames of monocular initialisations, in order of id
-  mutable std::mutex records_mutex_;
-  std::vector<StageRecord> stage_runs_;  // this and the next four members are guarded by records_mutex_
-  std::vector<LoopRecord> loops_;
-  std::vector<TimeNs> keyframe_time_ns_;            // by KeyframeId
-  std::map<FrameId, TimeNs> deferred_time_ns_;      // frames from which keyframes are being created
-  std::vector<tracking::CreatedKeyframe> created_;  // keyframes whose frame records are not marked yet
+  RunRecords records_;
   double final_adjustment_ms_ = 0, calibration_ms_ = 0;
   calibration::RigRefinement calibration_;
   bool calibration_refined_ = false;

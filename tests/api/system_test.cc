@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <set>
 #include <stdexcept>
 
@@ -92,7 +94,14 @@ TEST_F(PublicSystem, TheMapCanBeReadSavedAndContinued) {
   process(system, 0, kFrames);
   ASSERT_TRUE(system.finish());
   ASSERT_TRUE(system.save_map(file));
+  ASSERT_TRUE(system.save_map(file));  // an earlier map is replaced
   EXPECT_FALSE(system.save_map("/no/such/folder/map"));
+  const auto notes = folder.path() / "notes.txt";
+  std::ofstream(notes) << "precious";
+  const Status refused = system.save_map(notes);
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().message().find("found an existing file of another kind"), std::string::npos);
+  EXPECT_EQ(std::filesystem::file_size(notes), 8u);
 
   auto map = MapView::load(file);
   ASSERT_TRUE(map) << map.error().message();

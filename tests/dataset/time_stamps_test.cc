@@ -83,6 +83,9 @@ TEST(TimeStamps, AWrongUnitIsAskedAbout) {
 TEST(TimeStamps, RejectsValuesOutOfRange) {
   auto images = images_at(1'403'636'579'763'555'584, 50 * kMillisecond);
   EXPECT_EQ(convert_time_stamps({.unit_ns = 1000}, "cam0", images).error().key, "--stamp-unit");
+  EXPECT_EQ(convert_time_stamps({.unit_ns = 1000}, "cam0", images).error().message(),
+            "cam0: --stamp-unit: found time stamp 1403636579763555584, which is too large for this unit, expected time "
+            "stamps in this unit; those in nanoseconds need no option");
   EXPECT_EQ(convert_time_stamps({.rate_hz = 20}, "cam0", images).error().key, "--rate");
   for (const double rate : {0.0, -1.0, 1e9, std::nan("")})
     EXPECT_EQ(convert_time_stamps({.rate_hz = rate}, "cam0", images).error().file, "--rate");

@@ -164,6 +164,21 @@ TEST(Coverage, CountsFramesWithDenserGroundTruth) {
   EXPECT_DOUBLE_EQ(result->coverage, 128.0 / 150.0);
 }
 
+TEST(Coverage, OfThePartThatWasRunCountsLossesWithinItOnly) {
+  const Trajectory frames = winding(200);
+  for (const Trajectory& truth : {frames, winding(2000, kFrame / 10)}) {
+    Trajectory part(frames.begin() + 40, frames.begin() + 80);
+    auto result = evaluate(part, truth, {});
+    ASSERT_TRUE(result.ok());
+    EXPECT_LT(result->coverage, 0.21);
+    EXPECT_DOUBLE_EQ(result->coverage_of_part, 1.0);
+    part.erase(part.begin() + 10, part.begin() + 20);
+    result = evaluate(part, truth, {});
+    ASSERT_TRUE(result.ok());
+    EXPECT_DOUBLE_EQ(result->coverage_of_part, 30.0 / 40.0);
+  }
+}
+
 // As EuRoC ground truth of a simulated recording, which ends an interval after the last image.
 TEST(Coverage, IsCompleteIfGroundTruthBeginsAndEndsWithinAnIntervalOfTheImages) {
   const Trajectory dense = winding(1991, kFrame / 10), frames = winding(200);  // both end with frame 199

@@ -73,7 +73,8 @@ TEST(RejectedResult, ItsTaskIsRunAgainOnTheNewestVersion) {
 TEST(RejectedResult, LoopsAreFoundAgainWithLaterKeyframes) {
   for (const Stage stage : kStages) {
     EXPECT_FALSE(is_repeated(stage, CommitOutcome::kCommitted));
-    EXPECT_FALSE(is_repeated(stage, CommitOutcome::kDiscarded));
+    EXPECT_FALSE(is_repeated(stage, CommitOutcome::kUnchanged));
+    EXPECT_FALSE(is_repeated(stage, CommitOutcome::kStopped));
   }
   EXPECT_TRUE(is_repeated(Stage::kMap, CommitOutcome::kRejected));
   EXPECT_FALSE(is_repeated(Stage::kLoop, CommitOutcome::kRejected));

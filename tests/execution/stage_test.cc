@@ -8,7 +8,7 @@ namespace bslam::execution {
 namespace {
 
 TEST(Stage, OnlyAResultThatWillBeCommittedSupersedesOthers) {
-  const std::vector<Stage> none, global = {Stage::kGlobal}, all = {Stage::kCalibrate, Stage::kGlobal};
+  const Superseded none, global{{Stage::kGlobal}, {}}, all{{Stage::kGlobal}, {Stage::kCalibrate}};
   const StageWorld world;
   map::MapStore store{world.empty_map()};
   store.commit(world.with_keyframe(FrameId(0), store.snapshot()));
@@ -29,9 +29,8 @@ TEST(Stage, OnlyAResultThatWillBeCommittedSupersedesOthers) {
   EXPECT_EQ(superseded(Stage::kLoop, correction), none);  // its commit will be rejected
 }
 
-TEST(Stage, CalibrationsAndAdjustmentsCanBeSuperseded) {
-  for (const Stage stage : kStages)
-    EXPECT_EQ(can_be_superseded(stage), stage == Stage::kCalibrate || stage == Stage::kGlobal) << stage_name(stage);
+TEST(Stage, OnlyAdjustmentsCanBeDropped) {
+  for (const Stage stage : kStages) EXPECT_EQ(can_be_dropped(stage), stage == Stage::kGlobal) << stage_name(stage);
 }
 
 TEST(Stage, FramesAwaitTheFirstCalibrations) {

@@ -5,7 +5,9 @@
 #include <Eigen/Eigenvalues>
 #include <map>
 #include <sstream>
+#include <tuple>
 
+#include "adjustment/bundle_problem.h"
 #include "map_export/exported_map.h"
 
 namespace bslam::map_export {
@@ -91,12 +93,28 @@ TEST(PoseGraphFile, IsConnectedAndAtItsOptimum) {
   for (const auto& [id, c] : component) EXPECT_EQ(c, component.begin()->second) << id;
 }
 
+// The standard deviations of the keypoints of all keyframes that observe a landmark, as in adjustments.
+using Deviations = std::map<std::tuple<LandmarkId, KeyframeId, CameraIndex>, double>;
+Deviations deviations(const map::BundledMap& map) {
+  const adjustment::BundleProblem problem = adjustment::build_problem(
+      map, {.free_keyframes = map.keyframe_ids(), .fixed_keyframes = {}, .landmarks = map.landmark_ids()},
+      {.pyramid = map.pyramid()});
+  Deviations out;
+  for (std::size_t i = 0; i < problem.sources.size(); ++i) {
+    const auto& observation = problem.problem.observations[i];
+    out[{problem.sources[i].landmark, problem.sources[i].keyframe, observation.camera}] = observation.sigma;
+  }
+  return out;
+}
+
 // The sum of squares of the reprojection errors of one landmark in two keyframes, about its minimum: the second
 // keyframe is moved by g2o's increment `d`, and the landmark by `m`. Residuals are linearised by differences.
 Matrix6d numerical_information(const map::BundledMap& map, KeyframeId i, KeyframeId j) {
   Matrix6d sum = Matrix6d::Zero();
   const SE3 T_world_j = map.keyframe(j).T_rig_world.inverse();
+  const Deviations sigmas = deviations(map);
   for (const LandmarkId l : map.landmark_ids()) {
+    if (map.observations(l).size() < 2) continue;  // not in both keyframes
     std::vector<Eigen::Matrix<double, 2, 9>> rows;
     bool in_i = false, in_j = false;
     for (const map::Observation& o : map.observations(l)) {
@@ -104,7 +122,7 @@ Matrix6d numerical_information(const map::BundledMap& map, KeyframeId i, Keyfram
       (o.keyframe == i ? in_i : in_j) = true;
       for (const frame::KeypointRef r : map.keyframe(o.keyframe).frame->bundled.keypoints(o.feature)) {
         const SE3 T_cam_rig = map.rig().cam_from_rig(r.camera);
-        const double sigma = map.keypoints(o.keyframe, r.camera).sigma[r.keypoint.index()];
+        const double sigma = sigmas.at({l, o.keyframe, r.camera});
         const auto pixel = [&](const Eigen::Matrix<double, 9, 1>& d) {
           const Eigen::Vector3d q = d.segment<3>(3);
           const SE3 step(Eigen::Quaterniond(std::sqrt(1 - q.squaredNorm()), q.x(), q.y(), q.z()), d.head<3>());

@@ -141,6 +141,10 @@ TEST(ReportTruth, CountsWhileTheRecordingWasProcessed) {
   for (std::size_t i = 0; i < 10; ++i) path.dataset.frames.push_back({path.poses[i].time_ns, {}});
   path.poses.resize(10);
   EXPECT_NEAR(double(report_truth(path.dataset, path.poses, true)["coverage"]), 1.0, 1e-9);
+  path.poses.resize(5);
+  EXPECT_NEAR(double(report_truth(path.dataset, path.poses, true)["coverage"]), 0.5, 1e-9);
+  const TimeNs interrupted_ns = path.poses.back().time_ns;
+  EXPECT_NEAR(double(report_truth(path.dataset, path.poses, true, interrupted_ns)["coverage"]), 1.0, 1e-9);
 }
 
 }  // namespace

@@ -17,6 +17,7 @@
 #include "rig_formats/bslam_rig.h"
 #include "rig_formats/rig_file.h"
 #include "simulator/simulation_writer.h"
+#include "storage/small_map.h"
 #include "support/bag_writer.h"
 #include "support/data_on_disk.h"
 #include "synthetic/rigs.h"
@@ -53,6 +54,18 @@ TEST_F(RigReport, IsTextOrJson) {
   EXPECT_NEAR(parsed["baselines"][0]["length_m"].get<double>(), std::sqrt(0.12 * 0.12 + 2e-4), 1e-9);
   EXPECT_TRUE(parsed["warnings"].empty());
   EXPECT_FALSE(report_rig({.file = (folder_ / "none.yaml").string()}));
+}
+
+TEST_F(RigReport, OfASavedMapShowsItsCameras) {
+  const std::string file = (folder_ / "map.bmap").string();
+  const camera::Rig rig = synthetic::ring_rig(3);
+  ASSERT_TRUE(storage::write_map(storage::small_map(rig), storage::small_info(), file));
+  const auto parsed = nlohmann::json::parse(report_rig({.file = file, .json = true}).value());
+  EXPECT_EQ(parsed["format"], "saved map");
+  ASSERT_EQ(parsed["cameras"].size(), 3u);
+  EXPECT_EQ(parsed["cameras"][2]["name"], rig.camera(2).name);
+  const auto with_images = report_rig({.file = file, .images = folder_.string()});
+  ASSERT_FALSE(with_images);
 }
 
 TEST_F(RigReport, JsonOfANameThatIsNoUnicodeCanBeRead) {

@@ -312,6 +312,18 @@ TEST(SystemSequential, InitialisesUpToScaleSoonAfterADarkFirstFrame) {
   EXPECT_GT(tracked_frames(system), 8u);
 }
 
+// The first one is made from an earlier frame than the one that initialises the map.
+TEST(SystemSequential, KeyframesOfAMonocularInitialisationHaveTheTimesOfTheirFrames) {
+  const RenderedTour tour(1, 8);
+  System system(tour.rig(), small_config(execution::Mode::kSequential));
+  for (std::size_t k = 0; k < 8 && tracked_frames(system) == 0; ++k) must_process(system, tour.frames()[k]);
+  const map::MapSnapshot map = system.snapshot();
+  ASSERT_EQ(map->num_keyframes(), 2u);
+  for (const KeyframeId k : map->keyframe_ids())
+    EXPECT_EQ(system.keyframe_time(k), map->keyframe(k).frame->time_ns) << k.value();
+  EXPECT_LT(system.keyframe_time(KeyframeId(0)), system.keyframe_time(KeyframeId(1)));
+}
+
 TEST(SystemSequential, RejectsAnInvalidFrameAndContinues) {
   const RenderedTour tour(2, 6);
   System system(tour.rig(), small_config(execution::Mode::kSequential)),
