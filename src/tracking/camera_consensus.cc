@@ -167,16 +167,19 @@ solver::PoseSolution pose_of_most_consistent_camera(const camera::Rig& rig, cons
 }
 
 std::vector<std::uint8_t> cameras_losing_view(const std::vector<LandmarkCounts>& reobserved,
+                                              std::span<const LandmarkCounts> aligned,
                                               const std::vector<CameraConsensusState>& states,
                                               const ConsensusOptions& options) {
   std::vector<std::uint8_t> out(reobserved.size(), 0);
   const auto counts = [&](const LandmarkCounts& e) { return e.expected >= options.min_expected; };
-  const bool any_healthy = std::ranges::any_of(reobserved, [&](const LandmarkCounts& e) {
+  const auto healthy = [&](const LandmarkCounts& e) {
     return counts(e) && e.ratio() >= options.healthy_reobservation_ratio;
-  });
+  };
+  const bool any_healthy = std::ranges::any_of(reobserved, healthy);
   for (std::size_t c = 0; any_healthy && c < out.size(); ++c) {
     out[c] = counts(reobserved[c]) && reobserved[c].ratio() < options.min_reobservation_ratio &&
-             states[c].reobservation_ratio >= options.previous_reobservation_ratio;
+             states[c].reobservation_ratio >= options.previous_reobservation_ratio &&
+             !(c < aligned.size() && healthy(aligned[c]));
   }
   return out;
 }

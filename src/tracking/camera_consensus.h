@@ -75,8 +75,12 @@ solver::PoseSolution pose_of_most_consistent_camera(const camera::Rig& rig, cons
 
 // Flags the cameras that lost most of their landmarks from one frame to the next while another camera re-observed its
 // landmarks. A camera that loses them over several frames is not flagged: a near object may be moving through its view.
-// At least one camera is not flagged.
+// At least one camera is not flagged, nor is one in whose image direct tracking has just aligned the patches of its
+// landmarks: some of them, which other cameras see in more detail, are found by alignment but not by descriptors.
+// `aligned`: per camera, the landmarks that direct tracking searched for in this frame, and the inliers among them;
+// empty if it was not tried or found no pose.
 std::vector<std::uint8_t> cameras_losing_view(const std::vector<LandmarkCounts>& reobserved,
+                                              std::span<const LandmarkCounts> aligned,
                                               const std::vector<CameraConsensusState>& states,
                                               const ConsensusOptions& options);
 

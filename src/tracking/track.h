@@ -121,6 +121,8 @@ struct TrackOutput {
 struct EstimatedPose {
   geometry::SE3 T_rig_world;
   bool all_cameras = true;  // every camera supports it
+  // Per camera: the landmarks searched for, and the inliers among them.
+  std::vector<LandmarkCounts> aligned = {};
 };
 
 struct TrackInput {

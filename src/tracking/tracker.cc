@@ -74,7 +74,10 @@ void count_features(const BundledFrame& frame, FrameRecord& record) {
 
 std::optional<EstimatedPose> estimate_of(const DirectAttempt& direct) {
   if (!direct.outcome || direct.failure == DirectFailure::kDoubtful) return std::nullopt;
-  return EstimatedPose{direct.outcome->record.result.T_rig_world, direct.all_cameras};
+  const TrackResult& result = direct.outcome->record.result;
+  EstimatedPose out{result.T_rig_world, direct.all_cameras};
+  for (const CameraCounts& camera : result.cameras) out.aligned.push_back({camera.keypoints, camera.inliers});
+  return out;
 }
 
 // The options with the number of cameras of the run.

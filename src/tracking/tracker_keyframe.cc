@@ -63,7 +63,7 @@ std::optional<TrackOutcome> Tracker::create_keyframe(KeyframeRequest request, st
   FrontEndState& state = outcome.next;
   apply_scale_change(*map, state.track);
   Input input{std::move(request.frame), pyramids, map};
-  TrackOutput output = follow(input, state, EstimatedPose{*T_rig_world, true});
+  TrackOutput output = follow(input, state, EstimatedPose{*T_rig_world});
   if (output.result.status != TrackStatus::kTracking) return std::nullopt;
   input.frame = output.frame;  // refined by tracking
   outcome.record.result = output.result;

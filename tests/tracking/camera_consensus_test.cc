@@ -11,14 +11,23 @@ using Flags = std::vector<std::uint8_t>;
 
 TEST(CameraConsensus, FlagsCamerasThatLoseTheirLandmarksWhileAnotherDoesNot) {
   const ConsensusOptions options;
-  EXPECT_EQ(cameras_losing_view({{100, 80}, {100, 2}}, std::vector<CameraConsensusState>(3), options), Flags({0, 1}));
-  EXPECT_EQ(cameras_losing_view({{100, 3}, {100, 2}, {60, 50}}, std::vector<CameraConsensusState>(3), options),
+  EXPECT_EQ(cameras_losing_view({{100, 80}, {100, 2}}, {}, std::vector<CameraConsensusState>(3), options),
+            Flags({0, 1}));
+  EXPECT_EQ(cameras_losing_view({{100, 3}, {100, 2}, {60, 50}}, {}, std::vector<CameraConsensusState>(3), options),
             Flags({1, 1, 0}));
-  EXPECT_EQ(cameras_losing_view({{100, 80}, {100, 30}}, std::vector<CameraConsensusState>(3), options), Flags({0, 0}))
+  // Direct tracking has just found most of the landmarks of the camera, or few.
+  EXPECT_EQ(cameras_losing_view({{100, 80}, {100, 2}}, std::vector<LandmarkCounts>{{90, 80}, {60, 50}},
+                                std::vector<CameraConsensusState>(3), options),
+            Flags({0, 0}));
+  EXPECT_EQ(cameras_losing_view({{100, 80}, {100, 2}}, std::vector<LandmarkCounts>{{90, 80}, {60, 10}},
+                                std::vector<CameraConsensusState>(3), options),
+            Flags({0, 1}));
+  EXPECT_EQ(cameras_losing_view({{100, 80}, {100, 30}}, {}, std::vector<CameraConsensusState>(3), options),
+            Flags({0, 0}))
       << "re-observed fraction above the minimum";
-  EXPECT_EQ(cameras_losing_view({{100, 80}, {10, 0}}, std::vector<CameraConsensusState>(3), options), Flags({0, 0}))
+  EXPECT_EQ(cameras_losing_view({{100, 80}, {10, 0}}, {}, std::vector<CameraConsensusState>(3), options), Flags({0, 0}))
       << "too few expected landmarks";
-  EXPECT_EQ(cameras_losing_view({{100, 5}, {100, 2}}, std::vector<CameraConsensusState>(3), options), Flags({0, 0}))
+  EXPECT_EQ(cameras_losing_view({{100, 5}, {100, 2}}, {}, std::vector<CameraConsensusState>(3), options), Flags({0, 0}))
       << "no healthy camera";
 }
 
@@ -54,9 +63,9 @@ TEST(CameraConsensus, KeepsACameraThatLosesItsLandmarksGradually) {
   std::vector<CameraConsensusState> before(3);
   update_reobservation_ratio(before[1], {100, 70}, options);
   update_reobservation_ratio(before[2], {100, 45}, options);
-  EXPECT_EQ(cameras_losing_view(now, before, options), (std::vector<std::uint8_t>{0, 1, 0}));
+  EXPECT_EQ(cameras_losing_view(now, {}, before, options), (std::vector<std::uint8_t>{0, 1, 0}));
   update_reobservation_ratio(before[1], {10, 0}, options);  // too few landmarks, no update
-  EXPECT_EQ(cameras_losing_view(now, before, options), (std::vector<std::uint8_t>{0, 1, 0}));
+  EXPECT_EQ(cameras_losing_view(now, {}, before, options), (std::vector<std::uint8_t>{0, 1, 0}));
 }
 
 TEST(CameraConsensus, RetriesACameraAfterALongTimeUnlessItsViewIsDisplaced) {
