@@ -81,7 +81,7 @@ std::vector<CameraCalibration> cameras_of(nb::handle list) {
   std::vector<CameraCalibration> out;
   for (std::size_t i = 0; i < nb::len(list); ++i) {
     const nb::object camera(list[i]);
-    if (!nb::isinstance<CameraCalibration>(camera))
+    if (!nb::isinstance<CameraCalibration>(camera) || !nb::inst_ready(camera))
       raise({"Rig", "cameras[" + std::to_string(i) + "]", description_of(camera), "a Camera"});
     out.push_back(*nb::inst_ptr<CameraCalibration>(camera));
   }

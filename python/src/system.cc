@@ -120,7 +120,7 @@ PyType_Slot g_slots[] = {{Py_tp_traverse, reinterpret_cast<void*>(visit_referenc
                          {0, nullptr}};
 
 const Rig& rig_argument(nb::handle rig) {
-  if (!nb::isinstance<Rig>(rig))
+  if (!nb::isinstance<Rig>(rig) || !nb::inst_ready(rig))
     raise({"System", "rig", description_of(rig), "a Rig; Rig.load(path) reads a calibration"});
   return *nb::inst_ptr<Rig>(rig);
 }

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 
 #include "adjustment/landmark_noise.h"
 #include "adjustment/pose_uncertainty.h"
+#include "base/median.h"
 
 namespace bslam::adjustment {
 namespace {
@@ -68,32 +70,31 @@ map::SetPoses adjusted_poses(const map::BundledMap& map, const BundleProblem& se
   return poses;
 }
 
-// The factors by which the adjustment changed the lengths about keyframes: if the scale of the map is not known, those
-// of a submap of which one keyframe is fixed are free. Frames that are placed relative to a keyframe follow.
+// The factors by which the adjustment changed the lengths about keyframes: if the scale of the map is not known, the
+// size of a submap of which only one keyframe is fixed is free. The factor is the median over the landmarks of the
+// ratio of their distances from this keyframe. Frames that are placed relative to a keyframe follow.
 std::vector<std::pair<KeyframeId, double>> scale_changes(const map::BundledMap& map, const BundleProblem& selected) {
   if (map.scale() != map::Scale::kUnobservable) return {};
-  struct Submap {
-    std::vector<std::size_t> fixed, free;  // poses of the problem
-  };
-  std::map<KeyframeId, Submap> submaps;  // by root
+  std::map<KeyframeId, std::vector<std::size_t>> poses;  // of the problem, by root
   const std::vector<KeyframeId> root = map.root_of_each();
-  for (std::size_t i = 0; i < selected.keyframes.size(); ++i) {
-    Submap& submap = submaps[root[selected.keyframes[i].index()]];
-    (selected.problem.pose_free[i] ? submap.free : submap.fixed).push_back(i);
-  }
+  for (std::size_t i = 0; i < selected.keyframes.size(); ++i) poses[root[selected.keyframes[i].index()]].push_back(i);
   std::vector<std::pair<KeyframeId, double>> out;
-  for (const auto& [_, submap] : submaps) {
-    if (submap.fixed.size() != 1) continue;
-    const Eigen::Vector3d origin = selected.problem.T_rig_world[submap.fixed.front()].inverse().translation();
-    double before = 0, after = 0;  // sums of squared distances
-    for (const std::size_t i : submap.free) {
-      before += (map.keyframe(selected.keyframes[i]).T_rig_world.inverse().translation() - origin).squaredNorm();
-      after += (selected.problem.T_rig_world[i].inverse().translation() - origin).squaredNorm();
+  for (const auto& [submap, of_submap] : poses) {
+    std::vector<std::size_t> fixed;
+    std::ranges::copy_if(of_submap, std::back_inserter(fixed),
+                         [&](std::size_t i) { return !selected.problem.pose_free[i]; });
+    if (fixed.size() != 1 || of_submap.size() != map.keyframes_of_submap(submap).size()) continue;
+    const Eigen::Vector3d origin = selected.problem.T_rig_world[fixed.front()].inverse().translation();
+    std::vector<double> ratios;
+    for (std::size_t i = 0; i < selected.landmarks.size(); ++i) {
+      const map::Landmark& landmark = map.landmark(selected.landmarks[i]);
+      if (root[landmark.reference.keyframe.index()] != submap) continue;
+      const double ratio = (selected.problem.points[i] - origin).norm() / (landmark.position - origin).norm();
+      if (std::isfinite(ratio) && ratio > 0) ratios.push_back(ratio);
     }
-    if (!(before > 0 && after > 0)) continue;
-    const double change = std::sqrt(after / before);
-    out.emplace_back(selected.keyframes[submap.fixed.front()], change);
-    for (const std::size_t i : submap.free) out.emplace_back(selected.keyframes[i], change);
+    if (ratios.empty()) continue;
+    const double change = lower_median(std::move(ratios));
+    for (const std::size_t i : of_submap) out.emplace_back(selected.keyframes[i], change);
   }
   return out;
 }

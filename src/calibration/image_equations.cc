@@ -11,8 +11,7 @@ namespace {
 using geometry::Matrix6d;
 using geometry::Vector6d;
 
-constexpr int kMinObservations = 20;                         // of an image that determines extrinsics
-constexpr double kMaxUsedChi2 = 16 * solver::kChi2TwoDof95;  // of observations that are used
+constexpr int kMinObservations = 20;  // of an image that determines extrinsics
 constexpr double kMedianChi2SixDof = 5.348;
 constexpr std::size_t kMinPairs = 4;  // of successive images
 
@@ -34,7 +33,8 @@ void add(const solver::ReprojectionProblem& problem, const solver::RigValues& va
   sums.H += weight * Jt * Jt.transpose();
   sums.b += weight * Jt * e;
   sums.squared_errors += weight * chi2;
-  sums.keyframes = ++sums.observations >= kMinObservations;
+  ++sums.observations;
+  if (sums.observations == kMinObservations) sums.keyframes = 1;
 }
 
 }  // namespace

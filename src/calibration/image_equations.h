@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "calibration/rig_problem.h"
+#include "solver/reprojection.h"
 
 namespace bslam::calibration {
 
@@ -20,6 +21,9 @@ struct ImageEquations {
   bool enough() const { return keyframes > 0; }
   void add(const ImageEquations& other);
 };
+
+// Maximum squared normalised error of observations that are used.
+inline constexpr double kMaxUsedChi2 = 16 * solver::kChi2TwoDof95;
 
 // Per pose and camera of a problem, (poses, cameras) row-major. Gross outliers are ignored.
 std::vector<ImageEquations> image_equations(const RigProblem& problem, const solver::RigValues& values);

@@ -12,8 +12,7 @@ namespace {
 using geometry::SE3;
 using geometry::Vector6d;
 
-constexpr int kMinKeyframes = 3;                             // with enough observations, before and after a move
-constexpr double kMaxUsedChi2 = 16 * solver::kChi2TwoDof95;  // of observations that are used
+constexpr int kMinKeyframes = 3;  // with enough observations, before and after a move
 
 using Observation = solver::ReprojectionProblem::Observation;
 

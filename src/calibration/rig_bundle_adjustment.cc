@@ -1,12 +1,11 @@
 #include "calibration/rig_bundle_adjustment.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
 #include "base/assert.h"
+#include "calibration/deviation.h"
 #include "solver/bundle_equations.h"
 
 namespace bslam::calibration {
@@ -119,21 +118,6 @@ double excess_error(const Eigen::VectorXd& change, const Eigen::MatrixXd& inform
   return std::max(0.0, change.dot(of_images * change) / std::max(1.0, 2.0 * cost) - by_noise);
 }
 
-// The length of the part of a change in directions whose deviation is not less than kObservedRatio times the prior's.
-double unobserved_length(const Eigen::Vector3d& change, const Eigen::Matrix3d& covariance,
-                         const Eigen::Matrix3d& prior) {
-  const Eigen::LLT<Eigen::Matrix3d> factor(prior);
-  const Eigen::Matrix3d half = factor.matrixL().solve(covariance), relative = factor.matrixL().solve(half.transpose());
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> directions(relative);
-  const Eigen::Vector3d parts = directions.eigenvectors().transpose() * factor.matrixL().solve(change);
-  Eigen::Vector3d unobserved = Eigen::Vector3d::Zero();
-  for (int k = 0; k < 3; ++k) {
-    if (directions.eigenvalues()(k) >= kObservedRatio * kObservedRatio)
-      unobserved += parts(k) * directions.eigenvectors().col(k);
-  }
-  return (factor.matrixL() * unobserved).norm();
-}
-
 void report_extrinsics(const Eigen::MatrixXd& covariance, const solver::ExtrinsicPrior& prior, RigAdjustment& out) {
   for (std::size_t c = 1; c < out.cameras.size(); ++c) {
     CameraEstimate& camera = out.cameras[c];
@@ -144,7 +128,7 @@ void report_extrinsics(const Eigen::MatrixXd& covariance, const solver::Extrinsi
       camera.observed[static_cast<std::size_t>(k)] =
           std::sqrt(camera.covariance(k, k)) < kObservedRatio * std::sqrt(of_prior(k, k));
     camera.unobserved_shift = unobserved_length(camera.change.tail<3>(), camera.covariance.bottomRightCorner<3, 3>(),
-                                                of_prior.bottomRightCorner<3, 3>());
+                                                of_prior.bottomRightCorner<3, 3>(), kObservedRatio);
   }
 }
 

@@ -82,7 +82,8 @@ struct RigAdjustment {
   double final_cost = 0;       // cost as in LmSummary, of the inliers and the prior
   double variance_factor = 1;  // mean squared normalised error over its expectation; if > 1 it scales the covariances
   double scale_change = 1;     // factor by which all lengths of the problem were multiplied (see sigma_scale)
-  // Relative increase of the mean squared error of the observations if the calibration were constant.
+  // Relative increase of the mean squared error of the observations if the calibration were constant, less the increase
+  // that is expected of a right one, because its estimate fits noise; at least 0.
   double excess_error = 0;
 };
 

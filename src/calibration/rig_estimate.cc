@@ -64,6 +64,7 @@ int recover(const EstimateInput& input, const MovedCameras& cameras, const solve
 }
 
 // Adjusts, and adjusts again if the errors within images are more correlated than the options say, which then say so.
+// The first result, which trusts the images too much, is not used even if the second adjustment fails.
 RigAdjustment adjust_correlated(const EstimateInput& input, RigAdjustmentOptions& options,
                                 const solver::RigValues& start, RigProblem& problem) {
   const solver::ReprojectionProblem before = problem.selected.problem;

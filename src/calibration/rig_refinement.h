@@ -75,7 +75,7 @@ struct CalibrationOptions {
         "scale_tolerance_percent", self.scale_tolerance_percent, Range{0, 100}, "%",
         "during a run, smaller changes of the map's scale are not applied, nor changes within its standard deviation");
     visitor("correlated_observations", self.correlated_observations, Range{1, 1e4}, "",
-            "minimum number of observations that carry as much information as one");
+            "number of observations that carry as much information as one; more if the images show it");
     visitor("inconsistent_excess", self.inconsistent_excess, Range{0, 100}, "",
             "the images contradict a calibration that increases the mean squared error by more than this fraction");
     visitor("suspect_sigmas", self.suspect_sigmas, Range{1, 100}, "",
@@ -165,7 +165,7 @@ struct RigRefinement {
   std::vector<CameraRefinement> cameras;     // all cameras in the order of the rig, if done
   std::vector<MoveEstimate> moves;           // in order of time; the extrinsics in `cameras` are those before them
   std::size_t keyframes = 0, landmarks = 0;  // numbers of keyframes and landmarks used
-  double excess_error = 0;                   // relative increase of the mean squared error with the given calibration
+  double excess_error = 0;                   // of the given calibration (RigAdjustment)
   Verdict verdict = Verdict::kUnknown;
   // If done: the estimated rig, and the poses and landmarks that belong to it, of the keyframes and landmarks used.
   std::optional<camera::Rig> rig;

@@ -160,14 +160,10 @@ double coverage(const Trajectory& estimate, const Trajectory& ground_truth, std:
 
 namespace {
 
-// The ground truth from the first to the last estimated pose.
-Trajectory part_of(const Trajectory& ground_truth, const Trajectory& estimate, TimeNs max_dt_ns) {
-  Trajectory part;
-  for (const TimedPose& pose : ground_truth) {
-    if (pose.time_ns >= estimate.front().time_ns - max_dt_ns && pose.time_ns <= estimate.back().time_ns + max_dt_ns)
-      part.push_back(pose);
-  }
-  return part;
+// The ground truth from that of the first pair to that of the last one.
+Trajectory part_of(const Trajectory& ground_truth, std::span<const Association> pairs) {
+  const auto at = [&](std::size_t i) { return ground_truth.begin() + static_cast<std::ptrdiff_t>(i); };
+  return {at(pairs.front().ground_truth), at(pairs.back().ground_truth) + 1};
 }
 
 }  // namespace
@@ -212,8 +208,7 @@ Result<TrajectoryEvaluation> evaluate(const Trajectory& estimate, const Trajecto
   result.ate = statistics_of(std::move(distances));
   result.rpe = relative_errors(result.aligned_estimate, ground_truth, pairs, options.rpe_delta_s);
   result.coverage = coverage(estimate, ground_truth, pairs, options.max_dt_ns);
-  result.coverage_of_part =
-      coverage(estimate, part_of(ground_truth, estimate, options.max_dt_ns), pairs, options.max_dt_ns);
+  result.coverage_of_part = coverage(estimate, part_of(ground_truth, pairs), pairs, options.max_dt_ns);
   result.gt_length_m = path_length_m(ground_truth);
   return result;
 }

@@ -108,7 +108,7 @@ class ParallelExecutor : public StageExecutor {
     if (q.running) q.running->request_stop();
   }
 
-  static void restart(StageQueue& q) {
+  static void stop_to_rerun(StageQueue& q) {
     if (!q.running || q.running->stop_requested()) return;
     q.restart = true;
     q.running->request_stop();
@@ -199,7 +199,7 @@ class ParallelExecutor : public StageExecutor {
   void supersede(const Superseded& tasks) {
     const std::lock_guard lock(mutex_);
     for (const Stage stage : tasks.dropped) drop(queue(stage));
-    for (const Stage stage : tasks.restarted) restart(queue(stage));
+    for (const Stage stage : tasks.restarted) stop_to_rerun(queue(stage));
     changed_.notify_all();  // queues have space
   }
 

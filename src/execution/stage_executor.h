@@ -58,7 +58,7 @@ struct ExecutionSetup {
 };
 
 // clang-format off
-// Creates the executor of a mode. `gate` must outlive it. Commits may drop tasks of other stages; see superseded_by in
+// Creates the executor of a mode. `gate` must outlive it. Commits may drop or restart tasks of other stages; see superseded_by in
 // execution/stage.h.
 // - sequential: each stage is run and committed in the caller's thread, within enqueue().
 // - parallel: one thread per stage. A task uses the newest version at its start and is committed when it is done.

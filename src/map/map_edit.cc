@@ -74,10 +74,10 @@ void MapDraft::set_poses(SetPoses poses) {
   std::erase_if(poses.keyframes, [&](const auto& entry) { return !working_.set_pose(entry.first, entry.second); });
   std::erase_if(poses.landmarks, [&](const auto& entry) { return !working_.set_position(entry.first, entry.second); });
   std::erase_if(poses.scale_changes, [&](const auto& entry) { return !working_.alive(entry.first); });
-  if (poses.keyframes.empty() && poses.landmarks.empty()) return;
-  if (!poses.scale_changes.empty()) working_.scale_keyframes(poses.scale_changes);
   std::erase_if(poses.uncertainties,
                 [&](const auto& entry) { return !working_.set_uncertainty(entry.first, entry.second); });
+  if (poses.keyframes.empty() && poses.landmarks.empty()) return;
+  if (!poses.scale_changes.empty()) working_.scale_keyframes(poses.scale_changes);
   if (poses.correction) working_.begin_gauge_epoch();
   edit_.operations.emplace_back(std::move(poses));
 }

@@ -98,6 +98,7 @@ struct SetPoses {
   // Factors by which lengths about a keyframe change (BundledMap::scale_keyframes); keyframes without one keep theirs.
   std::vector<std::pair<KeyframeId, double>> scale_changes = {};
   // BundledKeyframe::uncertainty of some keyframes, also of some that are not in `keyframes`; the others keep theirs.
+  // Lengths are those before `scale_changes`, which rescales them.
   std::vector<std::pair<KeyframeId, geometry::PoseUncertainty>> uncertainties = {};
 };
 struct SetTwists {

@@ -175,14 +175,20 @@ bool Rebase::operator()(const SetPoses& op) {
     written_.insert(edit_id);
     any |= map_.set_pose(k, T_rig_world);
   }
+  for (const auto& [edit_id, factor] : op.scale_changes) {  // keyframes that are rescaled where they are
+    const KeyframeId k = map_id(edit_id);
+    if (!map_.alive(k) || motions.contains(k)) continue;
+    motions[k] = motion_between(map_.keyframe(k).T_rig_world, map_.keyframe(k).T_rig_world, factor);
+    written_.insert(edit_id);
+  }
   for (const auto& [edit_id, position] : op.landmarks) any |= map_.set_position(map_id(edit_id), position);
+  for (const auto& [edit_id, uncertainty] : op.uncertainties) map_.set_uncertainty(map_id(edit_id), uncertainty);
   if (op.correction && any) map_.begin_gauge_epoch();
   std::vector<std::pair<KeyframeId, double>> scaled = move_newer(motions);
   for (const auto& [k, factor] : scale_changes) {
     if (map_.alive(k)) scaled.emplace_back(k, factor);
   }
   if (!scaled.empty()) map_.scale_keyframes(scaled);
-  for (const auto& [edit_id, uncertainty] : op.uncertainties) map_.set_uncertainty(map_id(edit_id), uncertainty);
   return any;
 }
 

@@ -1,5 +1,5 @@
-// Information and covariance of landmark positions. The keypoints have the standard deviations of adjustments
-// (adjustment/landmark_keypoints.h), with that of the detector by default, which is not part of a map.
+// Information and covariance of landmark positions. The keypoints have the standard deviations that adjustments use
+// (adjustment/landmark_keypoints.h). Maps do not store that of the detector, so that its default is used.
 #pragma once
 
 #include <Eigen/Core>

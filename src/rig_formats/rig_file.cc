@@ -210,6 +210,8 @@ RigFormat format_of_output(const fs::path& out) {
 }
 
 bool is_saved_map(const fs::path& file) {
+  std::error_code error;
+  if (!fs::is_regular_file(file, error)) return false;
   std::string begin(kMapBegin.size(), '\0');
   std::ifstream stream(file, std::ios::binary);
   return stream.read(begin.data(), static_cast<std::streamsize>(begin.size())) && begin == kMapBegin;
@@ -219,7 +221,7 @@ Result<RigFile> read_rig_file(const fs::path& path) {
   std::error_code error;
   if (fs::is_directory(path, error)) return read_folder(path);
   if (is_saved_map(path))
-    return Error{path.string(), "", "a saved map", "a calibration; bslam rig info shows the cameras of a map"};
+    return Error{path.string(), "", "a saved map", "a calibration; bslam rig info FILE shows the cameras of a map"};
   auto text = read_text(path, kMaxRigBytes);
   if (!text) return text.error();
   std::string names;

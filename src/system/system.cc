@@ -86,7 +86,7 @@ void System::discard_map() {
   early_.clear();
   pipeline_.restart();
   executor_->restart();
-  if (closer_) closer_->begin_path();  // no stage is running now
+  if (closer_ && !executor_->over()) closer_->begin_path();  // no stage is running, unless the run was interrupted
   records_.discard_map();
   created_keyframes_.clear();
   frames_.back().map_withdrawn = true;

@@ -78,7 +78,7 @@ solver::PoseSolution pose_of_most_consistent_camera(const camera::Rig& rig, cons
 // At least one camera is not flagged, nor is one in whose image direct tracking has just aligned the patches of its
 // landmarks: some of them, which other cameras see in more detail, are found by alignment but not by descriptors.
 // `aligned`: per camera, the landmarks that direct tracking searched for in this frame, and the inliers among them;
-// empty if it was not tried or found no pose.
+// empty if it was not tried, or found no pose or a doubtful one.
 std::vector<std::uint8_t> cameras_losing_view(const std::vector<LandmarkCounts>& reobserved,
                                               std::span<const LandmarkCounts> aligned,
                                               const std::vector<CameraConsensusState>& states,

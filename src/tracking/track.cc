@@ -82,8 +82,7 @@ bool track_in_narrow_windows(const TrackInput& input, const std::vector<Landmark
   out.matches = keep_inliers(found, solution.inlier);
   out.reason = LostReason::kNone;
   out.reobserved = count_reobserved(map, frame, out.T_rig_world, input.state.cameras, out.matches);
-  const std::span<const LandmarkCounts> aligned =
-      input.estimate ? std::span(input.estimate->aligned) : std::span<const LandmarkCounts>();
+  const auto aligned = input.estimate ? input.estimate->aligned : std::vector<LandmarkCounts>();
   const auto lost = cameras_losing_view(out.reobserved, aligned, input.state.cameras, options.consensus);
   for (std::size_t c = 0; c < lost.size(); ++c) excluded[c] |= lost[c];
   out.excluded = std::move(excluded);

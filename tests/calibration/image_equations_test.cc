@@ -28,7 +28,7 @@ synthetic::FeatureSimulator simulator(const camera::Rig& rig) {
   return {rig, synthetic::make_orbit({.duration_s = 60}), options};
 }
 
-// A rig whose cameras but the first are turned by up to a standard deviation about random axes.
+// A rig whose cameras but the first are turned by normal random angles about their three axes.
 camera::Rig with_turned_cameras(const camera::Rig& rig, double sigma_deg, Random& random) {
   std::vector<camera::RigCamera> cameras = {{rig.camera(0), rig.body_from_cam(0)}};
   for (std::size_t c = 1; c < rig.size(); ++c) {
@@ -39,8 +39,8 @@ camera::Rig with_turned_cameras(const camera::Rig& rig, double sigma_deg, Random
   return camera::Rig(std::move(cameras));
 }
 
-// A map whose images were taken by cameras that are turned by random angles in each keyframe, and of which one is
-// turned by `moved_deg` from the middle of the recording on.
+// A map whose images were taken by cameras that are turned by other random angles in each keyframe, and by the same
+// ones, of deviation `moved_deg`, in all keyframes from the middle of the recording on.
 map::BundledMap map_of(const camera::Rig& rig, double sigma_deg, double moved_deg = 0) {
   Random random(1);
   map::SimulatedMap out(simulator(rig));

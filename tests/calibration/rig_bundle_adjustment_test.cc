@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "calibration/deviation.h"
 #include "solver/scene.h"
 
 namespace bslam::calibration {
@@ -207,26 +208,19 @@ TEST(AdjustRig, ADisplacedCameraDoesNotChangeTheScale) {
     EXPECT_LT(error_of(result, c, scene->rig).tail<3>().norm(), 0.004) << "camera " << c;
 }
 
-// The images determine where a camera of a pair is but for the length of the baseline.
-TEST(AdjustRig, OnlyTheDisplacementAlongTheBaselineIsNotObserved) {
-  const auto scene = walk(2, 6, 0.05, 600);
-  const Vector3d baseline = scene->rig.cam_from_rig(1).translation().normalized();
-  for (const bool along : {false, true}) {
-    const Vector3d shift = 0.015 * (along ? baseline : baseline.unitOrthogonal());
-    const Rig calibrated = with_error(scene->rig, 1, (Vector6d() << Vector3d::Zero(), shift).finished());
-    solver::ReprojectionProblem problem = scene->problem;
-    problem.rig = &calibrated;
-    RigAdjustmentOptions options;
-    options.sigma_translation = 0.01;
-    options.sigma_scale = 5e-3;
-    const RigAdjustment result = adjust_rig(problem, options);
-    ASSERT_TRUE(result.done);
-    const CameraEstimate& camera = result.cameras[1];
-    const Vector3d change = camera.change.tail<3>();
-    EXPECT_GT(change.norm(), along ? 0.0 : 0.012);
-    EXPECT_NEAR(camera.unobserved_shift, std::abs(change.dot(baseline)), 0.001) << along;
-    EXPECT_LT(camera.unobserved_shift, 0.005) << along;
-  }
+TEST(Deviation, OfADisplacementOnlyThePartThatIsNotObservedCounts) {
+  const Eigen::Matrix3d turn = geometry::so3_exp({0.3, -0.5, 0.8}).toRotationMatrix();
+  const Vector3d sigmas(1, 2, 4), change(3, 4, 12);
+  const Eigen::Matrix3d prior = sigmas.cwiseAbs2().asDiagonal();
+  const auto length = [&](const Vector3d& ratios) {
+    const Eigen::Matrix3d covariance = sigmas.cwiseProduct(ratios).cwiseAbs2().asDiagonal();
+    return unobserved_length(turn * change, turn * covariance * turn.transpose(), turn * prior * turn.transpose(), 0.5);
+  };
+  EXPECT_NEAR(length({0.1, 0.4, 0.9}), 12, 1e-9);
+  EXPECT_NEAR(length({0.1, 0.9, 0.4}), 4, 1e-9);
+  EXPECT_NEAR(length({0.6, 0.9, 0.4}), 5, 1e-9);
+  EXPECT_NEAR(length({1, 1, 1}), 13, 1e-9);
+  EXPECT_NEAR(length({0.1, 0.2, 0.3}), 0, 1e-9);
 }
 
 TEST(AdjustRig, CamerasAreDisplacedAtTheScaleOfTheOthers) {

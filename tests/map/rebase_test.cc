@@ -218,6 +218,28 @@ TEST_F(RebaseTest, NewKeyframesDoNotDependOnTheOrderOfTwoEdits) {
   expect_near(ends[0], ends[1]);
 }
 
+// A keyframe may be rescaled where it is: it is fixed while the size of its submap changes.
+TEST_F(RebaseTest, NewKeyframesAreRescaledWithAKeyframeThatStays) {
+  const auto frame = synthetic_frame(random, 2, 30, 10);
+  const SE3 T_new_world = random_pose(random, 1), T_third_new = random_pose(random, 1);
+  const SE3 T_root_world = store.snapshot()->keyframe(kRoot).T_rig_world;
+  constexpr double kChange = 1.3;
+  for (const bool keyframe_first : {true, false}) {
+    MapStore copy{BundledMap(*store.snapshot())};
+    MapDraft adding(copy.snapshot()), moving(copy.snapshot());
+    const KeyframeId k = adding.add_keyframe(frame, T_new_world, {}, kRoot);
+    moving.set_poses({.keyframes = {{kThird, T_third_new}},
+                      .landmarks = {},
+                      .scale_changes = {{kRoot, kChange}, {kThird, kChange}}});
+    copy.commit(std::move(keyframe_first ? adding : moving));
+    copy.commit(std::move(keyframe_first ? moving : adding));
+    const MapSnapshot after = copy.snapshot();
+    expect_near(after->keyframe(kRoot).T_rig_world, T_root_world);
+    expect_near(after->keyframe(k).T_rig_world * T_root_world.inverse(),
+                geometry::scaled(T_new_world * T_root_world.inverse(), kChange));
+  }
+}
+
 TEST_F(RebaseTest, VisibilityCountsAreForwardedAndAdded) {
   early->add_visibility_counts({{LandmarkId(1), 10, 5}});
   early->merge_landmarks(LandmarkId(0), LandmarkId(1));
