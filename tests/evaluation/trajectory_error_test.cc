@@ -172,6 +172,9 @@ TEST(Coverage, OfThePartThatWasRunCountsLossesWithinItOnly) {
     ASSERT_TRUE(result.ok());
     EXPECT_LT(result->coverage, 0.21);
     EXPECT_DOUBLE_EQ(result->coverage_of_part, 1.0);
+    result = evaluate(part, truth, {.max_dt_ns = 2 * kFrame});
+    ASSERT_TRUE(result.ok());
+    EXPECT_DOUBLE_EQ(result->coverage_of_part, 1.0);
     part.erase(part.begin() + 10, part.begin() + 20);
     result = evaluate(part, truth, {});
     ASSERT_TRUE(result.ok());

@@ -270,7 +270,7 @@ TEST_F(OwnRigFile, RejectsUnknownFormats) {
   EXPECT_FALSE(read_rig(folder_.path() / "none.yaml"));
   const Result<camera::Rig> map = read("BSLAMMAP\x05 and so on");
   EXPECT_EQ(map.error().found, "a saved map");
-  EXPECT_EQ(map.error().expected, "a calibration; bslam rig info shows the cameras of a map");
+  EXPECT_EQ(map.error().expected, "a calibration; bslam rig info FILE shows the cameras of a map");
   fs::create_directories(folder_.path() / "empty");
   EXPECT_EQ(read_rig(folder_.path() / "empty").error().found, "a folder without a calibration");
 }
