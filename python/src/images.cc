@@ -43,15 +43,6 @@ bool is_integer(nb::handle object) {
   return converts;
 }
 
-std::string description(nb::handle object, const Pixels& array) {
-  std::string out = "an array";
-  const nb::object type = nb::getattr(object, "dtype", nb::none());
-  if (!type.is_none()) out += " of " + nb::cast<std::string>(nb::str(nb::handle(type)));
-  out += ", shape (";
-  for (std::size_t i = 0; i < array.ndim(); ++i) out += (i > 0 ? ", " : "") + std::to_string(array.shape(i));
-  return out + ")";
-}
-
 // Returns an array of type uint8 and shape (h, w) in which the pixels of a row are adjacent.
 Pixels pixels_of(nb::handle object, const std::string& key) {
   Pixels array;
@@ -59,7 +50,7 @@ Pixels pixels_of(nb::handle object, const std::string& key) {
     raise({kProcess, key, type_of(object), "a uint8 array of shape (h, w), or None"});
   const bool grey =
       array.ndim() == 2 && array.dtype() == nb::dtype<std::uint8_t>() && array.device_type() == nb::device::cpu::value;
-  if (!grey) raise({kProcess, key, description(object, array), "a uint8 array of shape (h, w): 8-bit grey values"});
+  if (!grey) raise({kProcess, key, "an " + description_of(object), "a uint8 array of shape (h, w): 8-bit grey values"});
   if (array.shape(1) > 1 && array.stride(1) != 1) {
     raise({kProcess, key, std::to_string(array.stride(1)) + " bytes between the pixels of a row",
            "adjacent pixels, as made by numpy.ascontiguousarray"});

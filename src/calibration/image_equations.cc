@@ -3,7 +3,6 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 namespace bslam::calibration {
 namespace {
@@ -19,9 +18,7 @@ constexpr std::size_t kMinPairs = 4;  // of successive images
 void add(const solver::ReprojectionProblem& problem, const solver::RigValues& values,
          const solver::ReprojectionProblem::Observation& o, ImageEquations& sums) {
   const std::size_t c = o.camera.index();
-  const Eigen::Vector3d point_rig =
-      problem.T_rig_world[static_cast<std::size_t>(o.pose)] * problem.points[static_cast<std::size_t>(o.point)];
-  const Eigen::Vector3d point = solver::point_in_camera(problem, values, o, c, point_rig);
+  const Eigen::Vector3d point = solver::point_in_camera(problem, values, o, c);
   const auto residual = solver::residual(values.models[c], point, o.pixel.cast<double>());
   if (!residual) return;
   const double inverse_sigma = 1.0 / static_cast<double>(o.sigma);
@@ -62,14 +59,6 @@ std::pair<Vector6d, double> best_change(const ImageEquations& all, const ImageEq
   const Vector6d b = after.b - after.H * factor.solve(all.b);
   const Vector6d change = information.ldlt().solve(b);
   return {change, b.dot(change)};
-}
-
-std::vector<std::size_t> poses_by_time(const map::BundledMap& map, const RigProblem& problem) {
-  const auto time_of = [&](std::size_t pose) { return map.keyframe(problem.selected.keyframes[pose]).frame->time_ns; };
-  std::vector<std::size_t> out(problem.selected.keyframes.size());
-  std::iota(out.begin(), out.end(), 0);
-  std::ranges::stable_sort(out, {}, time_of);
-  return out;
 }
 
 double correlation_in_images(const map::BundledMap& map, const RigProblem& problem, const solver::RigValues& values) {

@@ -32,9 +32,6 @@ std::vector<ImageEquations> image_equations(const RigProblem& problem, const sol
 // twice that decrease.
 std::pair<geometry::Vector6d, double> best_change(const ImageEquations& all, const ImageEquations& after);
 
-// The poses of a problem in order of time, which is not always that of their creation.
-std::vector<std::size_t> poses_by_time(const map::BundledMap& map, const RigProblem& problem);
-
 // Number of observations of an image that carry as much information about the extrinsics of its camera as one
 // observation whose error is independent of the others: about 1 if the errors of an image are independent, and up to
 // the number of its observations if they are those of one displacement of the camera, such as by a wrong time stamp.

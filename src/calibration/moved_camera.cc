@@ -16,26 +16,14 @@ constexpr int kMinKeyframes = 3;  // with enough observations, before and after 
 
 using Observation = solver::ReprojectionProblem::Observation;
 
-// The point of an observation in the frame of camera c of the problem when the row of the pixel was exposed.
-Eigen::Vector3d point_in_camera(const solver::ReprojectionProblem& problem, const solver::RigValues& values,
-                                const Observation& o, std::size_t c) {
-  const Eigen::Vector3d point_rig =
-      problem.T_rig_world[static_cast<std::size_t>(o.pose)] * problem.points[static_cast<std::size_t>(o.point)];
-  return solver::point_in_camera(problem, values, o, c, point_rig);
-}
-
 // The cost of an observation with the extrinsics of camera c of the problem.
 double cost(const solver::ReprojectionProblem& problem, const solver::RigValues& values, const Observation& o,
             std::size_t c) {
-  const Eigen::Vector3d point = point_in_camera(problem, values, o, c);
+  const Eigen::Vector3d point = solver::point_in_camera(problem, values, o, c);
   const auto error = solver::residual_error(values.models[c], point, o.pixel.cast<double>());
   const double sigma = static_cast<double>(o.sigma);
   const double chi2 = error ? error->squaredNorm() / (sigma * sigma) : kMaxUsedChi2;
   return solver::huber_cost(std::min(chi2, kMaxUsedChi2));
-}
-
-TimeNs time_of(const map::BundledMap& map, const RigProblem& problem, std::size_t pose) {
-  return map.keyframe(problem.selected.keyframes[pose]).frame->time_ns;
 }
 
 }  // namespace

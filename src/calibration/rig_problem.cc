@@ -163,6 +163,17 @@ RigProblem choose(const map::BundledMap& map, bool timing, const CalibrationOpti
   return out;
 }
 
+TimeNs time_of(const map::BundledMap& map, const RigProblem& problem, std::size_t pose) {
+  return map.keyframe(problem.selected.keyframes[pose]).frame->time_ns;
+}
+
+std::vector<std::size_t> poses_by_time(const map::BundledMap& map, const RigProblem& problem) {
+  std::vector<std::size_t> out(problem.selected.keyframes.size());
+  std::iota(out.begin(), out.end(), 0);
+  std::ranges::stable_sort(out, {}, [&](std::size_t pose) { return time_of(map, problem, pose); });
+  return out;
+}
+
 void separate_groups(RigProblem& problem) {
   std::vector<solver::ReprojectionProblem::Observation>& observations = problem.selected.problem.observations;
   std::vector<int> count(problem.group.size());

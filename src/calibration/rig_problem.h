@@ -21,6 +21,10 @@ struct RigProblem {
 RigProblem choose(const map::BundledMap& map, bool timing, const CalibrationOptions& options,
                   const feature::FeatureModel& features);
 
+// The time of a pose of the problem, and the poses in order of time, which is not always that of their creation.
+TimeNs time_of(const map::BundledMap& map, const RigProblem& problem, std::size_t pose);
+std::vector<std::size_t> poses_by_time(const map::BundledMap& map, const RigProblem& problem);
+
 // Removes the observations of a point by groups other than the one with the most observations (the first one on ties).
 // Otherwise the point would connect two fixed keyframes, and their distance would constrain lengths, which the
 // extrinsics have to determine.

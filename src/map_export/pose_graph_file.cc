@@ -32,8 +32,7 @@ Matrix6d relative_information(const Selection& selection, KeyframeId i, Keyframe
   const Eigen::Matrix3d R_world_j = T_j_world.matrix3().transpose();
   Matrix6d information = Matrix6d::Zero();
   for (const LandmarkId l : common_landmarks(map, i, j)) {
-    const Eigen::Matrix3d W_i = landmark_information(selection, l, i);
-    const Eigen::Matrix3d W_j = landmark_information(selection, l, j);
+    const auto [W_i, W_j] = landmark_information(selection, l, i, j);
     // X_j <- X_j exp(t, q) moves the point, in the frame of j, by -t - 2 q x p.
     Matrix36d motion;
     motion.leftCols<3>() = -R_world_j;

@@ -168,6 +168,13 @@ Vector3d point_in_camera(const ReprojectionProblem& problem, const RigValues& ri
   return shutter.at_row(point_cam, static_cast<double>(o.pixel.y()));
 }
 
+Vector3d point_in_camera(const ReprojectionProblem& problem, const RigValues& rig,
+                         const ReprojectionProblem::Observation& o, std::size_t camera) {
+  const Vector3d point_rig =
+      problem.T_rig_world[static_cast<std::size_t>(o.pose)] * problem.points[static_cast<std::size_t>(o.point)];
+  return point_in_camera(problem, rig, o, camera, point_rig);
+}
+
 std::vector<double> squared_errors(const ReprojectionProblem& problem) {
   BSLAM_ASSERT(problem.rig != nullptr, "the problem must have a rig");
   return squared_errors(problem, problem.T_rig_world, problem.points, RigValues::of(*problem.rig));

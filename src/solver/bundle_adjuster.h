@@ -84,6 +84,9 @@ void check_problem(const ReprojectionProblem& problem);
 Vector3d point_in_camera(const ReprojectionProblem& problem, const RigValues& rig,
                          const ReprojectionProblem::Observation& observation, std::size_t camera,
                          const Vector3d& point_rig);
+// The same for the observed point at its position in the problem, seen from the pose of the observation.
+Vector3d point_in_camera(const ReprojectionProblem& problem, const RigValues& rig,
+                         const ReprojectionProblem::Observation& observation, std::size_t camera);
 
 // Squared normalised error of each observation at the problem's values; infinite if it does not project.
 std::vector<double> squared_errors(const ReprojectionProblem& problem);

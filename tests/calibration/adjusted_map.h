@@ -1,4 +1,4 @@
-// A simulated map that was adjusted as a whole with constant calibration.
+// Simulated maps that were adjusted as a whole with constant calibration.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -7,6 +7,15 @@
 #include "mapping/simulated_map.h"
 
 namespace bslam::map {
+
+// A rig on an orbit of a minute.
+inline synthetic::FeatureSimulator orbit_simulator(const camera::Rig& rig, const feature::FeatureModel& features) {
+  synthetic::FeatureSimulatorOptions options;
+  options.landmarks = 2500;
+  options.max_keypoints = 250;
+  options.sigma_px = features.sigma_px;
+  return {rig, synthetic::make_orbit({.duration_s = 60}), options};
+}
 
 inline BundledMap adjusted(SimulatedMap& world, const feature::FeatureModel& features) {
   adjustment::Selection all;

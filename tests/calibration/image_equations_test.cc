@@ -20,14 +20,6 @@ constexpr double kDegree = std::numbers::pi / 180;
 constexpr int kKeyframes = 20;
 constexpr double kStep_s = 0.3;
 
-synthetic::FeatureSimulator simulator(const camera::Rig& rig) {
-  synthetic::FeatureSimulatorOptions options;
-  options.landmarks = 2500;
-  options.max_keypoints = 250;
-  options.sigma_px = kFeatures.sigma_px;
-  return {rig, synthetic::make_orbit({.duration_s = 60}), options};
-}
-
 // A rig whose cameras but the first are turned by normal random angles about their three axes.
 camera::Rig with_turned_cameras(const camera::Rig& rig, double sigma_deg, Random& random) {
   std::vector<camera::RigCamera> cameras = {{rig.camera(0), rig.body_from_cam(0)}};
@@ -43,14 +35,14 @@ camera::Rig with_turned_cameras(const camera::Rig& rig, double sigma_deg, Random
 // ones, of deviation `moved_deg`, in all keyframes from the middle of the recording on.
 map::BundledMap map_of(const camera::Rig& rig, double sigma_deg, double moved_deg = 0) {
   Random random(1);
-  map::SimulatedMap out(simulator(rig));
+  map::SimulatedMap out(map::orbit_simulator(rig, kFeatures));
   for (int i = 0; i < kKeyframes; ++i) {
     camera::Rig now = with_turned_cameras(rig, sigma_deg, random);
     if (i >= kKeyframes / 2 && moved_deg > 0) {
       Random same(2);
       now = with_turned_cameras(now, moved_deg, same);
     }
-    out.sim = simulator(now);
+    out.sim = map::orbit_simulator(now, kFeatures);
     out.add_keyframe(FrameId(i), kStep_s * i);
   }
   return map::adjusted(out, kFeatures);

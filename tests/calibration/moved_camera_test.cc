@@ -40,14 +40,6 @@ camera::Rig with_extrinsics(const camera::Rig& rig, const Moved& moved) {
   return camera::Rig(std::move(cameras));
 }
 
-synthetic::FeatureSimulator simulator(const camera::Rig& rig) {
-  synthetic::FeatureSimulatorOptions options;
-  options.landmarks = 2500;
-  options.max_keypoints = 250;
-  options.sigma_px = kFeatures.sigma_px;
-  return {rig, synthetic::make_orbit({.duration_s = 60}), options};
-}
-
 // The rig after moves of cameras, but not of camera 0, at keyframe i. The last one of a camera counts.
 camera::Rig rig_at(const camera::Rig& rig, std::span<const Moved> moves, int i) {
   camera::Rig now = rig;
@@ -61,10 +53,10 @@ camera::Rig rig_at(const camera::Rig& rig, std::span<const Moved> moves, int i) 
 
 // A map of a rig of which cameras were moved, adjusted as if they had not been. `order`: of the creation of keyframes.
 map::BundledMap map_of(const camera::Rig& rig, std::span<const Moved> moves, std::span<const int> order = {}) {
-  map::SimulatedMap out(simulator(rig));
+  map::SimulatedMap out(map::orbit_simulator(rig, kFeatures));
   for (int n = 0; n < kKeyframes; ++n) {
     const int i = order.empty() ? n : order[static_cast<std::size_t>(n)];
-    out.sim = simulator(rig_at(rig, moves, i));
+    out.sim = map::orbit_simulator(rig_at(rig, moves, i), kFeatures);
     out.add_keyframe(FrameId(i), kStep_s * i);
   }
   return map::adjusted(out, kFeatures);
