@@ -264,7 +264,7 @@ bool assess(solver::BundleEquations& equations, const CalibrationBlocks& blocks,
 // Multiplies all lengths by a factor that gives the baselines the scale of the calibration; returns it.
 double restore_scale(const solver::ExtrinsicPrior& prior, solver::ReprojectionProblem& problem,
                      solver::BundleState& state) {
-  const double factor = 1.0 / solver::baseline_scale(state.rig.T_cam_rig, prior);
+  const double factor = 1.0 / solver::baseline_scale(state.rig.T_cam_rig, solver::baseline_weights(prior));
   for (geometry::SE3& T : state.rig.T_cam_rig) T = geometry::scaled(T, factor);
   for (geometry::SE3& T : state.T_rig_world) T = geometry::scaled(T, factor);
   for (geometry::Vector3d& point : state.points) point *= factor;

@@ -74,20 +74,23 @@ Matrix6d covariance_of(const ExtrinsicPrior& prior, std::size_t camera) {
   return out;
 }
 
-double baseline_scale(std::span<const SE3> T_cam_rig, std::span<const SE3> calibrated,
-                      std::span<const std::uint8_t> displaced) {
-  double sum = 0.0, reference = 0.0;
-  for (std::size_t c = 0; c < calibrated.size(); ++c) {
-    if (!displaced.empty() && displaced[c]) continue;
-    sum += T_cam_rig[c].translation().squaredNorm();
-    reference += calibrated[c].translation().squaredNorm();
+std::vector<double> baseline_weights(const ExtrinsicPrior& prior) {
+  std::vector<double> out(prior.T_cam_rig.size(), 0.0);
+  double sum = 0.0;
+  for (std::size_t c = 1; c < num_with_baseline(prior); ++c) {
+    const Vector3d& t = prior.T_cam_rig[c].translation();
+    if ((!prior.displaced.empty() && prior.displaced[c]) || t.squaredNorm() == 0) continue;
+    out[c] = 1.0 / t.normalized().dot(covariance_of(prior, c).bottomRightCorner<3, 3>() * t.normalized());
+    sum += out[c] * t.squaredNorm();
   }
-  return reference > 0 ? std::sqrt(sum / reference) : 1.0;
+  for (double& weight : out) weight = sum > 0 ? weight / sum : 0.0;
+  return out;
 }
 
-double baseline_scale(std::span<const SE3> T_cam_rig, const ExtrinsicPrior& prior) {
-  const std::size_t n = num_with_baseline(prior);
-  return baseline_scale(T_cam_rig.first(n), std::span(prior.T_cam_rig).first(n), prior.displaced);
+double baseline_scale(std::span<const SE3> T_cam_rig, std::span<const double> weights) {
+  double sum = 0.0;
+  for (std::size_t c = 0; c < weights.size(); ++c) sum += weights[c] * T_cam_rig[c].translation().squaredNorm();
+  return sum > 0 ? std::sqrt(sum) : 1.0;
 }
 
 std::vector<std::uint8_t> displaced_cameras(std::span<const SE3> T_cam_rig, const ExtrinsicPrior& prior) {
@@ -119,18 +122,13 @@ Vector6d extrinsic_change(const SE3& T_cam_rig, const SE3& reference) {
 }
 
 ExtrinsicsBlock::ExtrinsicsBlock(ExtrinsicPrior prior) : prior_(std::move(prior)) {
-  double sum = 0.0;
-  for (std::size_t c = 0; c < prior_.T_cam_rig.size(); ++c) {
-    const bool displaced = !prior_.displaced.empty() && prior_.displaced[c];
-    if (!displaced && c < num_with_baseline(prior_)) sum += prior_.T_cam_rig[c].translation().squaredNorm();
-    information_.push_back(covariance_of(prior_, c).inverse());
-  }
-  if (prior_.sigma_scale > 0 && sum > 0) scale_gradient_ = 1.0 / (prior_.sigma_scale * sum);
+  for (std::size_t c = 0; c < prior_.T_cam_rig.size(); ++c) information_.push_back(covariance_of(prior_, c).inverse());
+  if (prior_.sigma_scale > 0) baseline_weights_ = baseline_weights(prior_);
 }
 
 double ExtrinsicsBlock::scale_error(const RigValues& values) const {
-  if (scale_gradient_ == 0) return 0.0;
-  return (baseline_scale(values.T_cam_rig, prior_) - 1.0) / prior_.sigma_scale;
+  if (baseline_weights_.empty()) return 0.0;
+  return (baseline_scale(values.T_cam_rig, baseline_weights_) - 1.0) / prior_.sigma_scale;
 }
 
 void ExtrinsicsBlock::evaluate(const RigObservation& observation, Eigen::Ref<Jacobian> J) const {
@@ -164,14 +162,13 @@ void ExtrinsicsBlock::add_prior(const RigValues& values, Eigen::Ref<Eigen::Matri
     H.block<6, 6>(at, at) += JtI * J;
     b.segment<6>(at) -= JtI * change;
   }
+  if (baseline_weights_.empty()) return;
   // The distance |t| of a camera changes by t . v / |t| for the left perturbation (w, v) of T_cam_rig = [R, t].
-  const double gradient = scale_gradient_ / baseline_scale(values.T_cam_rig, prior_);
+  const double factor = 1.0 / (prior_.sigma_scale * baseline_scale(values.T_cam_rig, baseline_weights_));
   Eigen::VectorXd scale_jacobian = Eigen::VectorXd::Zero(size());
-  for (std::size_t c = 1; c < num_with_baseline(prior_); ++c) {
-    if (!prior_.displaced.empty() && prior_.displaced[c]) continue;
+  for (std::size_t c = 1; c < values.T_cam_rig.size(); ++c)
     scale_jacobian.segment<3>(6 * (static_cast<Eigen::Index>(c) - 1) + 3) =
-        gradient * values.T_cam_rig[c].translation();
-  }
+        factor * baseline_weights_[c] * values.T_cam_rig[c].translation();
   H += scale_jacobian * scale_jacobian.transpose();
   b -= scale_error(values) * scale_jacobian;
 }

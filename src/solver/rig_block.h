@@ -58,9 +58,8 @@ class RigBlock {
 using RigBlocks = std::vector<std::unique_ptr<RigBlock>>;
 
 // Prior for the extrinsics of all cameras but the first: normal distributions around the calibrated values, and one of
-// the common scale of all baselines, the root of sum |c|^2 / sum |c'|^2 with the estimated and calibrated camera
-// centres c and c' in the rig frame: this depends on the lengths of the baselines only, not on their directions. Images
-// do not determine this scale, so that it needs a separate prior, however uncertain the extrinsics are.
+// the common scale of all baselines (baseline_scale). Images do not determine this scale, so that it needs a separate
+// prior, however uncertain the extrinsics are.
 struct ExtrinsicPrior {
   std::vector<SE3> T_cam_rig;                        // calibrated, per camera
   double sigma_rotation = 0, sigma_translation = 0;  // radians, metres; per axis
@@ -79,13 +78,15 @@ struct ExtrinsicPrior {
 // Covariance of extrinsic_change() of a camera by the prior.
 geometry::Matrix6d covariance_of(const ExtrinsicPrior& prior, std::size_t camera);
 
-// The common scale of the baselines relative to that of the calibration, see above, of the cameras that are not
-// `displaced`. 1 if these have the same centre in the calibration.
-double baseline_scale(std::span<const SE3> T_cam_rig, std::span<const SE3> calibrated,
-                      std::span<const std::uint8_t> displaced = {});
+// Weights w_c of the baselines in their common scale, the inverse variance of the calibrated position c' of a camera in
+// the rig frame along the direction of c', divided by sum w_c |c'|^2. 0: camera 0, cameras that are displaced, cameras
+// at the centre of camera 0, and those behind `with_baseline`. Thereby a baseline along an optical axis counts less.
+std::vector<double> baseline_weights(const ExtrinsicPrior& prior);
 
-// The same of the cameras that count in a prior.
-double baseline_scale(std::span<const SE3> T_cam_rig, const ExtrinsicPrior& prior);
+// The common scale of the baselines relative to that of the calibration, the root of sum w_c |c|^2 with the estimated
+// camera centres c in the rig frame: this depends on the lengths of the baselines only, not on their directions. 1 if
+// all weights are 0.
+double baseline_scale(std::span<const SE3> T_cam_rig, std::span<const double> weights);
 
 // Flags the cameras whose centres are farther than four standard deviations from the calibrated ones, at the scale that
 // half of the baselines do not exceed: with a mean, one camera that was displaced would spoil the scale of all. At
@@ -114,7 +115,7 @@ class ExtrinsicsBlock : public RigBlock {
 
   ExtrinsicPrior prior_;
   std::vector<geometry::Matrix6d> information_;  // per camera: the inverse of covariance_of()
-  double scale_gradient_ = 0;                    // 1 / (sigma_scale sum |c'|^2); 0 without a prior of the scale
+  std::vector<double> baseline_weights_;         // of the common scale; empty without a prior of it
 };
 
 // Per camera: the index of the camera whose unknowns it uses, which is its own or, for a camera after a move, the

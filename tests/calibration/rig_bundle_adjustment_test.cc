@@ -188,8 +188,10 @@ TEST(AdjustRig, FindsIntrinsicsAndKeepsTheScaleOfTheBaselines) {
       EXPECT_TRUE(result.cameras[c].intrinsics_observed[0]) << "camera " << c;
       EXPECT_LT(std::abs(error(0)), 0.002 * camera::parameters(scene->rig.camera(c).model)(0)) << "camera " << c;
     }
-    const solver::RigValues truth = solver::RigValues::of(calibrated);
-    EXPECT_NEAR(solver::baseline_scale(result.values.T_cam_rig, truth.T_cam_rig), 1.0, 1e-9);
+    const auto weights = solver::baseline_weights({.T_cam_rig = solver::RigValues::of(calibrated).T_cam_rig,
+                                                   .sigma_translation = options.sigma_translation,
+                                                   .sigma_depth = options.sigma_depth});
+    EXPECT_NEAR(solver::baseline_scale(result.values.T_cam_rig, weights), 1.0, 1e-9);
   }
 }
 
@@ -240,12 +242,33 @@ TEST(AdjustRig, CamerasAreDisplacedAtTheScaleOfTheOthers) {
 
 // A baseline whose direction is corrected keeps its length.
 TEST(AdjustRig, TheScaleOfTheBaselinesIsThatOfTheirLengths) {
-  const std::vector<SE3> given = {SE3(), SE3(Eigen::Quaterniond::Identity(), Vector3d(0.1, 0, 0))};
-  const std::vector<SE3> found = {SE3(), SE3(Eigen::Quaterniond::Identity(), Vector3d(0.08, 0.06, 0))};
-  EXPECT_NEAR(solver::baseline_scale(found, given), 1.0, 1e-12);
-  const std::vector<SE3> twice = {SE3(), SE3(Eigen::Quaterniond::Identity(), Vector3d(0, 0, -0.2))};
-  EXPECT_NEAR(solver::baseline_scale(twice, given), 2.0, 1e-12);
-  EXPECT_EQ(solver::baseline_scale(std::vector{SE3(), SE3()}, std::vector{SE3(), SE3()}), 1.0);
+  const auto at = [](double x, double y, double z) {
+    return std::vector{SE3(), SE3(Eigen::Quaterniond::Identity(), Vector3d(x, y, z))};
+  };
+  const auto weights = solver::baseline_weights({.T_cam_rig = at(0.1, 0, 0), .sigma_translation = 0.005});
+  EXPECT_NEAR(solver::baseline_scale(at(0.08, 0.06, 0), weights), 1.0, 1e-12);
+  EXPECT_NEAR(solver::baseline_scale(at(0, 0, -0.2), weights), 2.0, 1e-12);
+  const auto centre = solver::baseline_weights({.T_cam_rig = at(0, 0, 0), .sigma_translation = 0.005});
+  EXPECT_EQ(solver::baseline_scale(at(0, 0, 0.2), centre), 1.0);
+}
+
+// The distance of a camera along an optical axis is less certain than that of one beside, so that it counts less.
+TEST(AdjustRig, TheScaleOfTheBaselinesWeighsThemByTheirDeviation) {
+  const auto at = [](double x, double z) { return SE3(Eigen::Quaterniond::Identity(), Vector3d(x, 0, z)); };
+  solver::ExtrinsicPrior prior{
+      .T_cam_rig = {SE3(), at(0.1, 0), at(0, 0.1)}, .sigma_translation = 0.003, .sigma_depth = 0.004};
+  // Variances along the baselines in mm^2: 9, and with both axes in the direction of the second 9 + 2 * 16 = 41.
+  const auto scale = [&] {
+    return solver::baseline_scale(std::vector{SE3(), at(0.1, 0), at(0, 0.2)}, solver::baseline_weights(prior));
+  };
+  EXPECT_NEAR(scale(), std::sqrt((1.0 / 9 + 4.0 / 41) / (1.0 / 9 + 1.0 / 41)), 1e-12);
+  prior.displaced = {0, 1, 0};
+  EXPECT_NEAR(scale(), 2.0, 1e-12);
+  prior.displaced = {0, 0, 1};
+  EXPECT_NEAR(scale(), 1.0, 1e-12);
+  prior.displaced.clear();
+  prior.with_baseline = 2;
+  EXPECT_NEAR(scale(), 1.0, 1e-12);
 }
 
 // With a right calibration nothing that the images do not demand is changed.
