@@ -30,7 +30,8 @@
 // | RemoveSubmap        | dropped if the submap was already removed or merged                                      |
 // | AddVisibilityCounts | forwarded along merges; entries of removed landmarks are dropped                         |
 // | RefreshLandmarks    | forwarded along merges; entries of removed landmarks are dropped                         |
-// | SetScale            | the last one committed wins                                                              |
+// | SetScale            | the last one committed wins; kMetric is dropped if a newer keyframe is the root of a     |
+// |                     | submap, whose scale the edit does not know                                               |
 // | SetRig              | the last one committed wins; newer keyframes get the bearings of the rig                 |
 // clang-format on
 //

@@ -73,8 +73,7 @@ class Rebase {
   bool operator()(const SetTwists& op);
   bool operator()(const AddVisibilityCounts& op);
   bool operator()(const RefreshLandmarks& op);
-  bool operator()(const SetScale& op) { return map_.set_scale(op.scale, op.deviation), true; }
-
+  bool operator()(const SetScale& op);
   bool operator()(const SetRig& op) { return map_.set_rig(op.rig, op.deviation, op.frames), true; }
 
   RebaseReport take_report() && { return std::move(report_); }
@@ -113,6 +112,14 @@ Motion Rebase::motion_since_base(KeyframeId edit_id) const {
   if (own(edit_id)) return own_motions_[edit_id.index() - base_.keyframe_slots()];
   const double scale_change = map_.keyframe(edit_id).scale / base_.keyframe(edit_id).scale;
   return motion_between(base_.resolved_pose(edit_id), map_.resolved_pose(edit_id), scale_change);
+}
+
+bool Rebase::operator()(const SetScale& op) {
+  for (std::size_t k = base_.keyframe_slots(); op.scale == Scale::kMetric && k < others_keyframes_end_; ++k) {
+    if (map_.alive(KeyframeId(k)) && map_.root_of(KeyframeId(k)) == KeyframeId(k)) return false;
+  }
+  map_.set_scale(op.scale, op.deviation);
+  return true;
 }
 
 bool Rebase::operator()(const AddKeyframe& op) {

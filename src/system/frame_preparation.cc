@@ -22,7 +22,7 @@ BundledFrame FramePreparation::begin(const image::ImageBundle& images, const tra
   for (std::size_t c = 0; c < frame.cameras.size(); ++c) {
     const TimeNs correction = rig_->camera(c).time_offset_ns - given_.camera(c).time_offset_ns;
     TimeNs& time_ns = frame.cameras[c].time_ns;
-    time_ns = config_.tracking.use_capture_times ? time_ns + correction : frame.time_ns;
+    time_ns = (config_.tracking.use_capture_times ? time_ns : frame.time_ns) + correction;
   }
   return frame;
 }

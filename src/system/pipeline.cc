@@ -85,6 +85,7 @@ tracking::TrackOutcome Pipeline::track(const image::ImageBundle& images, const t
   outcome.seen = executor.begin_frame(frame.id);
   frame.twist.tail<3>() *= state_.track.anchored.scale_change(*outcome.seen);  // planned at the scale of the state
   const bool recalibrated = preparation_.adopt_rig(*outcome.seen, frame);
+  if (recalibrated) tracker_.restart_monocular_start(state_);
   const auto created = adopt_keyframe(outcome);
   if (drop_repeated(*outcome.seen, faults, frame)) directly = false;
   if (config_.mode != execution::Mode::kSequential) end_stage("results");

@@ -4,6 +4,8 @@
 #include <limits>
 #include <utility>
 
+#include "base/median.h"
+
 namespace bslam::tracking {
 
 using geometry::SE3;
@@ -35,6 +37,13 @@ bool agreed_by_all(const solver::PoseSolution& pose, const FrameMatches& matches
   return std::ranges::all_of(agreeing, [&](const LandmarkCounts& camera) {
     return camera.expected < options.min_expected || camera.ratio() >= lower;
   });
+}
+
+// Median distance of the landmarks from the rig, in map units: a translation by it looks like a rotation by a radian.
+double median_distance(std::span<const solver::PoseObservation> observations, const SE3& T_rig_world) {
+  std::vector<double> distances;
+  for (const solver::PoseObservation& o : observations) distances.push_back((T_rig_world * o.point_world).norm());
+  return distances.empty() ? 1.0 : median(std::move(distances));
 }
 
 }  // namespace
@@ -131,17 +140,17 @@ solver::PoseSolution pose_of_most_consistent_camera(const camera::Rig& rig, cons
                                                     const solver::PoseSolution& of_all, const SE3& predicted,
                                                     const ConsensusOptions& options,
                                                     const solver::PoseSolverOptions& pose) {
-  constexpr double kRadiansPerMetre = 1.0;   // weight of a translation relative to a rotation
   constexpr double kMaxAgreeingChi2 = 25.0;  // squared normalised error of observations that agree with such a pose
   const auto healthy = [&](int inliers, std::size_t found) {
     return inliers >= options.healthy_reobservation_ratio * static_cast<double>(found);
   };
+  const double scene = median_distance(observations, predicted);
   solver::PoseSolution best;
   double min_distance = std::numeric_limits<double>::infinity();
   bool contradiction = true;  // no pose agrees with all cameras
   const auto consider = [&](const SE3& T_rig_world) {
     const geometry::Vector6d difference = (T_rig_world * predicted.inverse()).log();
-    const double distance = difference.head<3>().norm() + kRadiansPerMetre * difference.tail<3>().norm();
+    const double distance = difference.head<3>().norm() + difference.tail<3>().norm() / scene;
     solver::PoseSolverOptions near = pose;
     near.first_chi2 = kMaxAgreeingChi2;
     solver::PoseSolution joint = solver::solve_pose(rig, observations, T_rig_world, near);

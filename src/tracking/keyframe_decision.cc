@@ -99,6 +99,10 @@ double share_in_view(const map::BundledMap& map, KeyframeId keyframe, const fram
   return landmarks > 0 ? static_cast<double>(seen) / landmarks : 0.0;
 }
 
+KeyframeId newest_reference(std::span<const CameraReference> references) {
+  return std::ranges::max(references, {}, &CameraReference::keyframe).keyframe;
+}
+
 // The cameras that have an image, by the keyframe that they are compared with, the newest one first. It is the newest
 // of all also for a camera that is not in it but mostly finds its landmarks: others share its view. Some keyframe must
 // have an image of the camera nevertheless, for the depth that it measures together with them.
@@ -107,7 +111,7 @@ std::map<KeyframeId, std::vector<std::uint8_t>, std::greater<>> cameras_by_refer
     std::span<const CameraReference> references) {
   constexpr double kCovered = 0.5;        // fraction of the inliers
   constexpr std::size_t kMaxWithout = 8;  // number of keyframes without an image of a camera whose view others share
-  const KeyframeId newest = std::ranges::max(references, {}, &CameraReference::keyframe).keyframe;
+  const KeyframeId newest = newest_reference(references);
   std::vector<int> shared;
   std::map<KeyframeId, std::vector<std::uint8_t>, std::greater<>> out;
   for (std::size_t c = 0; c < inliers.size(); ++c) {
@@ -169,19 +173,46 @@ void compare_together(const map::BundledMap& map, KeyframeId reference, std::spa
   }
 }
 
-// The same in a frame that was tracked directly: the sum over the cameras.
+// The sum over the overlaps of the single cameras, in a frame that was tracked directly, or in which some of the
+// cameras with this reference have no image. `best_of_camera`: the maximum that they are compared with.
 void compare_each(const map::BundledMap& map, KeyframeId reference, std::span<const std::uint8_t> cameras,
-                  const FrameMatches& inliers, const geometry::SE3& T_rig_world,
+                  const FrameMatches& inliers, const geometry::SE3& T_rig_world, int CameraReference::*best_of_camera,
                   std::vector<CameraReference>& references, KeyframeEvidence& evidence) {
   const std::vector<int> overlap = overlap_by_camera(map, inliers, reference);
   evidence.overlap = evidence.best_overlap = 0;
   for (std::size_t c = 0; c < overlap.size(); ++c) {
     if (!cameras[c]) continue;
     const std::span late(&c, references[c].late ? 1 : 0);
-    int& best = references[c].best_direct_overlap;
+    int& best = references[c].*best_of_camera;
     best = best_overlap(map, reference, late, overlap[c], best, T_rig_world);
     evidence.overlap += overlap[c];
     evidence.best_overlap += best;
+  }
+}
+
+// Returns true if every camera with this reference is one of `cameras`, which have an image. Cameras that have never
+// found landmarks of it do not count.
+bool all_present(const map::BundledMap& map, KeyframeId reference, std::span<const std::uint8_t> cameras,
+                 std::span<const CameraReference> references) {
+  for (std::size_t c = 0; c < cameras.size(); ++c) {
+    if (!cameras[c] && references[c].best_own_overlap > 0 &&
+        map.nearest_alive_ancestor(references[c].keyframe) == reference)
+      return false;
+  }
+  return true;
+}
+
+// The overlap in a frame with features. Without the images of some cameras it is that of the others one by one, since
+// the maximum of all together cannot be reached.
+void compare_features(const map::BundledMap& map, KeyframeId reference, std::span<const std::uint8_t> cameras,
+                      const FrameMatches& inliers, const geometry::SE3& T_rig_world,
+                      std::vector<CameraReference>& references, KeyframeEvidence& evidence) {
+  KeyframeEvidence each = evidence;
+  compare_each(map, reference, cameras, inliers, T_rig_world, &CameraReference::best_own_overlap, references, each);
+  if (all_present(map, reference, cameras, references)) {
+    compare_together(map, reference, cameras, T_rig_world, references, evidence);
+  } else {
+    evidence = each;
   }
 }
 
@@ -231,12 +262,15 @@ std::vector<KeyframeEvidence> evidence_by_reference(const map::BundledMap& map, 
       if (compared[c]) e.frames_since_keyframe = std::min(e.frames_since_keyframe, references[c].frames);
     }
     if (direct) {
-      compare_each(map, reference, compared, inliers, T_rig_world, references, e);
+      compare_each(map, reference, compared, inliers, T_rig_world, &CameraReference::best_direct_overlap, references,
+                   e);
     } else {
-      compare_together(map, reference, compared, T_rig_world, references, e);
+      compare_features(map, reference, compared, inliers, T_rig_world, references, e);
     }
     // Cameras that hardly see anything, such as dark ones, would ask for a keyframe in each of their images.
-    if (out.empty() || e.best_overlap >= options.consensus.min_expected) out.push_back(e);
+    e.without_newest = reference != map.nearest_alive_ancestor(newest_reference(references));
+    const bool counts = e.best_overlap >= options.consensus.min_expected;
+    if (out.empty() || counts || (e.without_newest && e.camera_with_few_inliers)) out.push_back(e);
   }
   return out;
 }
@@ -253,7 +287,8 @@ bool keyframe_due(const KeyframeEvidence& e, const KeyframeOptions& options) {
   const double overlap = static_cast<double>(e.overlap) / std::max(1, e.best_overlap);
   if (overlap < options.min_overlap || e.parallax > options.max_parallax || e.untracked_depth) return true;
   const bool at_rest = e.parallax < kRestMaxParallax && overlap > kRestMinOverlap;
-  if (e.camera_with_few_inliers && e.frames_since_keyframe >= kFewInliersInterval && !at_rest) return true;
+  const int few_inliers_interval = e.without_newest ? kFewInliersInterval / 2 : kFewInliersInterval;
+  if (e.camera_with_few_inliers && e.frames_since_keyframe >= few_inliers_interval && !at_rest) return true;
   return e.frames_since_keyframe >= options.max_interval && !at_rest;
 }
 

@@ -12,19 +12,22 @@
 
 namespace bslam::tracking {
 
-// Number of frames after a keyframe after which a camera with few inliers makes the next one due; while tracking is
-// direct, the number of frames after which features are extracted because of such a camera.
+// Number of frames after a keyframe after which a camera with few inliers makes the next one due, half of it if the
+// newest keyframe has no image of the camera; while tracking is direct, the number of frames after which features are
+// extracted because of such a camera.
 inline constexpr int kFewInliersInterval = 8;
 
-// The keyframe with which the frames of a camera are compared: the newest one with an image of the camera. It is that
-// of all cameras unless some of them have images less often. If the cameras shared one, a camera that has no image in
-// keyframes would look as if its view had not changed, and would get fewer and fewer landmarks.
+// The keyframe with which the frames of a camera are compared: the newest one with an image of the camera. Cameras with
+// images in every keyframe have the newest one. A slower camera keeps the last keyframe that has its image: compared
+// with a newer one, it would seem unchanged, and would get fewer and fewer landmarks.
 struct CameraReference {
   KeyframeId keyframe;
   int frames = 0;  // number of frames of the rig that were tracked since then
-  // Maximum number of the keyframe's landmarks found in a frame since then: by all cameras with this reference together
-  // in frames with features, and by this camera in frames that were tracked directly.
+  // Maximum number of the keyframe's landmarks found in a frame since then: in frames with features by all cameras with
+  // this reference together, each landmark counted once, and by this camera; by this camera in frames that were tracked
+  // directly.
   int best_overlap = 0;
+  int best_own_overlap = 0;
   int best_direct_overlap = 0;
   bool late = false;  // the camera had no image in some frame since then
 };
@@ -35,6 +38,7 @@ struct KeyframeEvidence {
   int best_overlap = 0;  // maximum overlap of a frame since the keyframe
   double parallax = 0;   // rad, median angle at these landmarks between the rays to the reference and to this frame
   bool camera_with_few_inliers = false;  // some camera with keypoints has too few inliers
+  bool without_newest = false;           // the newest keyframe has no image of the cameras that are compared
   // Few features with accurate depth are tracked, and many are not yet landmarks: a keyframe would create new metric
   // landmarks.
   bool untracked_depth = false;

@@ -122,6 +122,8 @@ struct ConsensusOptions {
   int readmit_after = 3;               // number of consecutive frames with this fraction until the camera is used again
   double forget_after_s = 2.0;         // an excluded camera with too few landmarks in view for this time is used again
   double retry_after_s = 10.0;         // time after which an excluded camera is used again unless its view is displaced
+  // Largest angle by which the calibration may rotate the view of a camera that sees the right scene.
+  double max_calibration_error_deg = 4.0;
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
@@ -149,6 +151,8 @@ struct ConsensusOptions {
             "time without enough landmarks in view after which an excluded camera is used again");
     visitor("retry_after_s", self.retry_after_s, Range{0, 1e6}, "s",
             "time after which an excluded camera is used again unless its view is displaced");
+    visitor("max_calibration_error_deg", self.max_calibration_error_deg, Range{0, 90}, "deg",
+            "in a new map, a camera whose view is rotated by up to this angle is used: its calibration is wrong");
   }
 };
 
@@ -197,7 +201,9 @@ struct DirectOptions {
 
 struct TrackingOptions {
   FrontEnd frontend = FrontEnd::kAuto;
-  bool use_capture_times = true;  // the cameras of a frame have their own capture times; false: the time of the frame
+  // The cameras of a frame have their own capture times; false: the time of the frame. Estimated time offsets are
+  // added.
+  bool use_capture_times = true;
   int min_inliers = 30;           // minimum number of inlier keypoints of a pose, all cameras together
   int min_inliers_wide = 50;      // minimum number of inlier keypoints of a pose after a search in wide windows
   double min_inlier_ratio = 0.3;  // minimum ratio of inliers to matches of a pose, lower above 100 inliers

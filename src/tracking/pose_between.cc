@@ -40,6 +40,8 @@ std::optional<TrackResult> pose_between(const map::BundledMap& map, const Betwee
   const KeyframeId before = map.nearest_alive_ancestor(early.before), after = map.nearest_alive_ancestor(early.after);
   if (!before.valid() || !after.valid()) return std::nullopt;
   frame::BundledFrame frame = *early.frame;
+  if (frame::changes_frames(*early.rig, map.rig()))
+    frame = frame::recalibrated(std::move(frame), *early.rig, map.rig());
   const SE3 T_before = map.resolved_pose(early.before), T_after = map.resolved_pose(early.after);
   if (frame.time_ns == early.before_ns) return result_at(map, frame, T_before, before);
   const double between_s = to_seconds(early.after_ns - early.before_ns);

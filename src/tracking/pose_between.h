@@ -9,8 +9,9 @@ namespace bslam::tracking {
 
 struct BetweenKeyframes {
   std::shared_ptr<const frame::BundledFrame> frame;
-  KeyframeId before, after;            // ids of the commit; either keyframe may have been culled since
-  TimeNs before_ns = 0, after_ns = 0;  // times of their frames
+  KeyframeId before, after;                // ids of the commit; either keyframe may have been culled since
+  TimeNs before_ns = 0, after_ns = 0;      // times of their frames
+  std::shared_ptr<const camera::Rig> rig;  // the calibration of `frame`
 };
 
 // Returns nullopt if no pose of the frame has enough inliers in the map, or the submap of a keyframe was removed.

@@ -40,6 +40,7 @@ void change_level(int from, int to, TrackerState& state) {
   const double share = work_share(to) / work_share(from);
   for (CameraReference& r : state.references) {
     r.best_overlap = times(r.best_overlap, share);
+    r.best_own_overlap = times(r.best_own_overlap, share);
     r.best_direct_overlap = times(r.best_direct_overlap, share);
   }
   for (int& best : state.direct.best_inliers) best = times(best, share);

@@ -10,6 +10,7 @@
 #include "tracking/motion_prediction.h"
 #include "tracking/robust_pose.h"
 #include "tracking/track_output.h"
+#include "tracking/view_rotation.h"
 
 namespace bslam::tracking {
 namespace {
@@ -43,39 +44,62 @@ matching::ProjectionSearchOptions search_options(const TrackInput& input, const 
           .scale_factor = input.features.pyramid.scale_factor};
 }
 
+// Excludes the flagged cameras and drops their matches, found in narrow windows. In a new map, whose calibration was
+// not yet compared with the images, those whose view is merely rotated are not excluded: their calibration is wrong,
+// and can only be estimated with their images.
+void exclude(const TrackInput& input, const frame::BundledFrame& frame, const SE3& T_rig_world,
+             const std::vector<std::uint8_t>& flagged, const ConsensusOptions& options, FrameMatches& found,
+             std::vector<std::uint8_t>& excluded) {
+  const bool new_map = newly_started(input, frame);
+  for (std::size_t c = 0; c < flagged.size(); ++c) {
+    if (!flagged[c]) continue;
+    if (!new_map || !rotated_view(input.map, frame, c, T_rig_world, found[c], options)) excluded[c] = 1;
+    found[c].clear();
+  }
+}
+
+// If cameras contradict each other, excludes those that contradict the pose of the most consistent one, and estimates
+// the pose without their matches. Returns flags of these cameras.
+std::vector<std::uint8_t> exclude_contradicting(const TrackInput& input, const frame::BundledFrame& frame,
+                                                const TrackingOptions& options, FrameMatches& found,
+                                                std::vector<std::uint8_t>& excluded, solver::PoseSolution& solution) {
+  const ConsensusOptions& consensus = options.consensus;
+  const auto flagged = [&](const solver::PoseSolution& pose, const auto& flags) {
+    return flags(count_agreeing(found, pose.inlier, consensus), input.state.cameras, consensus);
+  };
+  std::vector<std::uint8_t> none(excluded.size(), 0);
+  if (!any(flagged(solution, conflicting_cameras))) return none;
+  const auto observations = pose_observations(input.map, frame, found, input.features);
+  const solver::PoseSolution consistent =
+      pose_of_most_consistent_camera(frame::rig_of(input.map.rig(), frame), found, observations, solution,
+                                     predict(input, frame.time_ns), consensus, options.pose);
+  if (!consistent.ok) return none;
+  const auto wrong = flagged(consistent, contradicting_cameras);
+  exclude(input, frame, consistent.T_rig_world, wrong, consensus, found, excluded);
+  const frame::RigAt resting(input.map.rig(), frame);
+  solution = solver::solve_pose(*resting, pose_observations(input.map, frame, found, input.features),
+                                consistent.T_rig_world, motion_model(input, frame), options.pose);
+  return wrong;
+}
+
 // Pose from landmarks found near their projections at the current estimate. Returns false if there are too few.
 bool track_in_narrow_windows(const TrackInput& input, const std::vector<LandmarkId>& landmarks,
                              const TrackingOptions& options, ThreadPool& pool, Coarse& out) {
   const map::BundledMap& map = input.map;
   const frame::BundledFrame& frame = out.frame;
-  const camera::Rig rig = frame::rig_of(map.rig(), frame);
   const SE3 predicted = out.T_rig_world;
   FrameMatches found = find_landmarks(map, frame, predicted, landmarks, {},
                                       search_options(input, options.matching, options.matching.predicted_radius), pool)
                            .found;
   std::vector<std::uint8_t> excluded = out.excluded;
   drop(excluded, found);
-  auto observations = pose_observations(map, frame, found, input.features);
   if (count(found) < static_cast<std::size_t>(options.min_inliers)) return false;
   const solver::MotionModel motion = motion_model(input, frame);
-  auto [solution, contest] = robust_pose(input, frame, found, observations, predicted, motion, options.pose);
-  const auto conflicting = [&](const solver::PoseSolution& pose, const auto& flags) {
-    return flags(count_agreeing(found, pose.inlier, options.consensus), input.state.cameras, options.consensus);
-  };
-  if (any(conflicting(solution, conflicting_cameras))) {
-    const SE3 from_motion = predict(input, frame.time_ns);
-    const auto consistent = pose_of_most_consistent_camera(rig, found, observations, solution, from_motion,
-                                                           options.consensus, options.pose);
-    if (consistent.ok) {
-      const auto wrong = conflicting(consistent, contradicting_cameras);
-      for (std::size_t c = 0; c < wrong.size(); ++c) excluded[c] |= wrong[c];
-      drop(excluded, found);
-      observations = pose_observations(map, frame, found, input.features);
-      const frame::RigAt resting(map.rig(), frame);
-      solution = solver::solve_pose(*resting, observations, consistent.T_rig_world, motion, options.pose);
-    }
-  }
-  if (!supported(solution, observations.size(), options.min_inliers, options)) return false;
+  auto [solution, contest] = robust_pose(input, frame, found, pose_observations(map, frame, found, input.features),
+                                         predicted, motion, options.pose);
+  const std::vector<std::uint8_t> contradicting =
+      exclude_contradicting(input, frame, options, found, excluded, solution);
+  if (!supported(solution, count(found), options.min_inliers, options)) return false;
   out.contest.add(contest);
   out.frame.twist = motion.twist(solution.T_rig_world);
   out.T_rig_world = solution.T_rig_world;
@@ -83,8 +107,9 @@ bool track_in_narrow_windows(const TrackInput& input, const std::vector<Landmark
   out.reason = LostReason::kNone;
   out.reobserved = count_reobserved(map, frame, out.T_rig_world, input.state.cameras, out.matches);
   const auto aligned = input.estimate ? input.estimate->aligned : std::vector<LandmarkCounts>();
-  const auto lost = cameras_losing_view(out.reobserved, aligned, input.state.cameras, options.consensus);
-  for (std::size_t c = 0; c < lost.size(); ++c) excluded[c] |= lost[c];
+  auto lost = cameras_losing_view(out.reobserved, aligned, input.state.cameras, options.consensus);
+  for (std::size_t c = 0; c < lost.size(); ++c) lost[c] = lost[c] && !contradicting[c];  // has been judged
+  exclude(input, frame, out.T_rig_world, lost, options.consensus, found, excluded);
   out.excluded = std::move(excluded);
   drop(out.excluded, out.matches);
   return true;

@@ -183,7 +183,7 @@ bool keyframe_needed(const map::BundledMap& map, const TrackingOptions& options,
       similar_keyframe(map, out.frame, out.matches, state.anchored.reference, out.result.T_rig_world, options.keyframe);
   if (!similar) return true;
   state.anchored = map::AnchoredPose::at(map, *similar, out.result.T_rig_world);
-  refer_to(*similar, out.frame, state.references);
+  refer_to(*similar, *map.keyframe(*similar).frame, state.references);
   const std::vector<int> overlap = overlap_by_camera(map, out.matches, *similar);
   for (std::size_t c = 0; c < overlap.size(); ++c) {
     if (state.references[c].keyframe == *similar) state.references[c].best_direct_overlap = overlap[c];

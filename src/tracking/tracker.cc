@@ -310,14 +310,16 @@ bool Tracker::gives_up(const FrontEndState& state, TimeNs time_ns) const {
 
 // The next frames search for the rig where its last motion would have taken it, or near its last pose if that is too
 // long ago. After too many lost frames a new submap is started. A short time without images is no reason to search
-// elsewhere.
+// elsewhere, and the next frame may still become the one that follows a pending keyframe.
 void Tracker::handle_lost(Input& input, const TrackerState& before, TrackOutcome& outcome) {
   FrontEndState& state = outcome.next;
   const TrackResult result = outcome.record.result;
   state.track = before;
   const bool recent = to_seconds(result.time_ns - before.time_ns) <= kMaxPrediction_s;
-  if (result.reason != LostReason::kNoImages || !recent) state.track.status = TrackStatus::kLost;
-  state.pending.reset();
+  if (result.reason != LostReason::kNoImages || !recent) {
+    state.track.status = TrackStatus::kLost;
+    state.pending.reset();
+  }
   if (!recent) state.track.twist.reset();
   update_odometry(*input.map, before, outcome);
   if (!had_features(result)) return;

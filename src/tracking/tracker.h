@@ -141,6 +141,9 @@ class Tracker {
   // simulated ones have no noise, and a video coder may remove it.
   bool stalled(const FrontEndState& state, bool repeated, const map::BundledMap& map) const;
 
+  // Forgets the frames of a monocular initialisation, for example because they have bearings of another calibration.
+  static void restart_monocular_start(FrontEndState& state);
+
   // Returns true if the next frame is to be tracked without features first.
   bool tracks_directly(const FrontEndState& state) const;
   // Tracks a frame without features. If that fails, the frame must be tracked again with features; the result of this

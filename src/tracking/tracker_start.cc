@@ -61,9 +61,13 @@ void Tracker::start(Input& input, TrackOutcome& outcome) const {
   if (relocaliser_) relocaliser_->describe(input.frame);
   if (std::optional<StartedMap> started = initialise(input, outcome.next, draft)) {
     // The first submap declares for the whole map whether its scale is metric. If it is not, each submap has its own
-    // arbitrary unit of length. A metric map remains so only with submaps that are metric.
-    const bool withdrawn = input.map->scale() == map::Scale::kMetric && started->scale != map::Scale::kMetric;
-    if (input.map->num_keyframes() == 0 || withdrawn) draft.set_scale(started->scale, started->scale_deviation);
+    // arbitrary unit of length. A metric map remains so only with submaps that are metric. Mapping may declare it
+    // metric before this submap is committed, which a submap of arbitrary unit withdraws.
+    const bool metric = started->scale == map::Scale::kMetric;
+    if (input.map->num_keyframes() == 0 || (!metric && input.map->scale() == map::Scale::kMetric))
+      draft.set_scale(started->scale, started->scale_deviation);
+    else if (!metric)
+      draft.set_scale(input.map->scale(), input.map->scale_deviation());
     outcome.edit = ProposedEdit{ProposedEdit::Kind::kStart, std::move(draft),
                                 std::move(started->keyframes.back().landmarks), input.map->landmark_slots()};
   } else {
@@ -115,9 +119,13 @@ bool Tracker::correct_rig(const Input& input, TrackOutcome& outcome) const {
   map::MapDraft draft(input.map);
   draft.set_rig(*std::move(corrected));
   outcome.edit = ProposedEdit{ProposedEdit::Kind::kRig, std::move(draft), {}, 0};
+  restart_monocular_start(state);
+  return true;
+}
+
+void Tracker::restart_monocular_start(FrontEndState& state) {
   state.start_reference.reset();
   state.waiting.clear();
-  return true;
 }
 
 // Stores the frame. The frame becomes the new reference frame if the present one is too old or has too few matches with
@@ -159,10 +167,10 @@ void Tracker::complete_start(const map::CommitReport& report, TrackOutcome& outc
   if (report.keyframes.size() == 2) {
     const TimeNs first_ns = state.start_reference->frame->time_ns;
     for (auto& early : state.waiting)
-      outcome.early.push_back({std::move(early), report.keyframes[0], report.keyframes[1], first_ns, result.time_ns});
+      outcome.early.push_back({std::move(early), report.keyframes[0], report.keyframes[1], first_ns, result.time_ns,
+                               report.published->shared_rig()});
   }
-  state.start_reference.reset();
-  state.waiting.clear();
+  restart_monocular_start(state);
   state.frames_lost = 0;
   state.T_map_odom = result.T_rig_world.inverse() * state.T_rig_odom;
 }

@@ -73,10 +73,17 @@ std::vector<std::uint8_t> contained(const std::vector<LandmarkId>& ids, const st
   return out;
 }
 
-// The number of landmarks to align in each image that shows some.
-int budget_of_image(const Candidates& candidates, const DirectOptions& options) {
-  const auto images = std::ranges::count_if(candidates, [](const auto& camera) { return !camera.empty(); });
-  const int share = options.per_rig / std::max(1, static_cast<int>(images));
+// The number of landmarks to align in each image. It depends on the cameras in use, not on those that have an image in
+// this frame: the landmarks found in a camera are compared with those found in its earlier images.
+int budget_of_image(const TrackInput& input, TimeNs time_ns, const Candidates& candidates,
+                    const DirectOptions& options) {
+  int in_use = 0;
+  for (std::size_t c = 0; c < candidates.size(); ++c) {
+    const bool before = c < input.state.cameras.size() && !input.state.cameras[c].landmarks.empty() &&
+                        to_seconds(time_ns - input.state.cameras[c].last_image_ns) <= kMaxPrediction_s;
+    in_use += before || !candidates[c].empty();
+  }
+  const int share = options.per_rig / std::max(1, in_use);
   return std::min(options.per_image, std::max(options.min_per_image, share));
 }
 
@@ -92,7 +99,7 @@ Candidates coarsest_landmarks(const TrackInput& input, const frame::BundledFrame
                               const LastLandmarks& last, const DirectOptions& options, ThreadPool& pool) {
   Candidates out(frame.cameras.size());
   add_visible(input, frame, T_rig_world, last.landmarks, last.points, {}, 0, pool, out);
-  const int count = options.coarse_per_image * budget_of_image(out, options) / options.per_image;
+  const int count = options.coarse_per_image * budget_of_image(input, frame.time_ns, out, options) / options.per_image;
   for (std::size_t c = 0; c < out.size(); ++c) {
     std::vector<Candidate>& candidates = out[c];
     if (static_cast<int>(candidates.size()) <= count) continue;
@@ -116,7 +123,7 @@ LocalLandmarks local_landmarks(const TrackInput& input, const frame::BundledFram
   }
   add_visible(input, frame, T_rig_world, view.landmarks, view.points, contained(view.landmarks, last.landmarks),
               last.landmarks.size(), pool, out.candidates);
-  const int budget = budget_of_image(out.candidates, options.direct);
+  const int budget = budget_of_image(input, frame.time_ns, out.candidates, options.direct);
   for (std::size_t c = 0; c < out.candidates.size(); ++c) {
     std::vector<Candidate>& candidates = out.candidates[c];
     std::stable_partition(candidates.begin(), candidates.end(),

@@ -104,6 +104,23 @@ TEST_F(RebaseTest, AdditionsToAScaledSubmapKeepTheirRelativePose) {
   EXPECT_NEAR((report.published->landmark(report.landmarks[1]).position - Eigen::Vector3d(6, 4, 2)).norm(), 0.0, 1e-12);
 }
 
+// The edit did not see the newer submap, which may have an arbitrary unit of length.
+TEST_F(RebaseTest, AMapWithANewerSubmapIsNotDeclaredMetric) {
+  early->set_scale(Scale::kUnobservable);
+  add_keyframe(*early, {});
+  late->set_scale(Scale::kMetric, 0.01);
+  const CommitReport report = commit();
+  EXPECT_EQ(report.dropped, 1u);
+  EXPECT_EQ(report.published->scale(), Scale::kUnobservable);
+}
+
+TEST_F(RebaseTest, AMapWithANewerKeyframeOfAKnownSubmapIsDeclaredMetric) {
+  early->set_scale(Scale::kUnobservable);
+  add_keyframe(*early, same_numbers(0, 30));
+  late->set_scale(Scale::kMetric, 0.01);
+  EXPECT_EQ(commit().published->scale(), Scale::kMetric);
+}
+
 TEST_F(RebaseTest, PosesInAnOldUnitAreDropped) {
   const SE3 before = early->map().keyframe(kSecond).T_rig_world;
   late->set_poses({{{kSecond, random_pose(random, 0.5)}}, {}, false});

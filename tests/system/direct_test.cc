@@ -59,6 +59,7 @@ class DirectTracking : public ::testing::Test {
     std::ranges::sort(state_.landmarks);
     predict(SE3());
     const image::ImageBundle& images = closed_walk().frames()[kFrames];
+    options_.keyframe.min_interval = 1000;  // no keyframe is due
     frame_.id = images.id;
     frame_.time_ns = images.time_ns;
     for (const image::CameraImage& i : images.images) {
@@ -78,13 +79,12 @@ class DirectTracking : public ::testing::Test {
   }
 
   tracking::DirectOutput track(std::span<const image::ImageView> masks = {}) {
-    tracking::TrackingOptions options;
-    options.keyframe.min_interval = 1000;  // no keyframe is due
     const tracking::TrackInput input{
         .map = *map_, .pyramids = pyramids_, .alignment = alignment_, .state = state_, .masks = masks};
-    return tracking::track_directly(input, frame_, options, pool_);
+    return tracking::track_directly(input, frame_, options_, pool_);
   }
 
+  tracking::TrackingOptions options_;
   ThreadPool pool_;
   map::MapSnapshot map_;
   tracking::TrackerState state_;
@@ -150,6 +150,24 @@ TEST_F(DirectTracking, IgnoresMaskedPixels) {
 }
 
 // A camera that loses the landmarks it had before needs features.
+// What a camera finds is compared with what it found in earlier frames, in which other cameras had an image.
+TEST_F(DirectTracking, AlignsAsManyLandmarksInAnImageIfAnotherCameraHasNone) {
+  state_.cameras.resize(frame_.cameras.size());
+  for (tracking::CameraConsensusState& camera : state_.cameras) {
+    camera.landmarks = state_.landmarks;
+    camera.last_image_ns = state_.time_ns;
+  }
+  options_.direct.per_rig = 80;
+  options_.direct.min_per_image = 20;
+  const auto searched = [&] { return track().output->result.cameras[0].keypoints; };
+  const int with_all = searched();
+  EXPECT_EQ(with_all, options_.direct.per_rig / static_cast<int>(frame_.cameras.size()));
+  for (std::size_t c = 1; c < frame_.cameras.size(); ++c) frame_.cameras[c].state = image::ImageState::kMissing;
+  EXPECT_EQ(searched(), with_all);
+  state_.cameras[1].last_image_ns -= 1'000'000'000;  // it failed
+  EXPECT_GT(searched(), with_all);
+}
+
 TEST_F(DirectTracking, NeedsFeaturesIfACameraLosesItsLandmarks) {
   state_.direct.best_inliers = {60, 100000};
   const auto found = track();

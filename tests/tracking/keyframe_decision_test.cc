@@ -158,8 +158,8 @@ FrameMatches all_matches_of(const map::BundledMap& map, KeyframeId k) {
 
 // Cameras 0 and 1 have an image in keyframe 8, the others in keyframe 4 only.
 std::vector<CameraReference> two_references() {
-  std::vector<CameraReference> out(4, {KeyframeId(8), 1, 0, 0});
-  out[2] = out[3] = {KeyframeId(4), 5, 0, 0};
+  std::vector<CameraReference> out(4, {KeyframeId(8), 1});
+  out[2] = out[3] = {KeyframeId(4), 5};
   return out;
 }
 
@@ -209,7 +209,7 @@ TEST(KeyframeReferences, TheFirstImageOfACameraMayAlreadyHaveLostMostOfThem) {
   const geometry::SE3 turned =
       geometry::SE3::exp((geometry::Vector6d() << 0, 0.9, 0, 0, 0, 0).finished()) * newest.T_rig_world;
   const auto lost = [&](const geometry::SE3& pose, bool late, bool direct) {
-    std::vector<CameraReference> references(4, {KeyframeId(8), 5, 0, 0, late});
+    std::vector<CameraReference> references(4, {.keyframe = KeyframeId(8), .frames = 5, .late = late});
     const auto e = evidence_by_reference(world.map, *newest.frame, matches, pose, {}, direct, references).at(0);
     return e.overlap < 0.8 * e.best_overlap;
   };
@@ -217,6 +217,33 @@ TEST(KeyframeReferences, TheFirstImageOfACameraMayAlreadyHaveLostMostOfThem) {
     EXPECT_TRUE(lost(turned, true, direct));
     EXPECT_FALSE(lost(newest.T_rig_world, true, direct));
     EXPECT_FALSE(lost(turned, false, direct));
+  }
+}
+
+// Without some of the cameras, fewer landmarks are found than all of them have found together.
+TEST(KeyframeReferences, CamerasWithoutAnImageDoNotReduceTheOverlap) {
+  const map::SimulatedMap world = true_map(simulator(synthetic::default_rig()), 4.0, 0.5);
+  const map::BundledKeyframe& newest = world.map.keyframe(KeyframeId(8));
+  frame::BundledFrame frame = *newest.frame;
+  FrameMatches matches = all_matches_of(world.map, KeyframeId(8));
+  for (const bool direct : {false, true}) {
+    std::vector<CameraReference> references(4, {KeyframeId(8), 5});
+    const auto overlap = [&](const frame::BundledFrame& of, const FrameMatches& found) {
+      const auto e = evidence_by_reference(world.map, of, found, newest.T_rig_world, {}, direct, references).at(0);
+      return static_cast<double>(e.overlap) / e.best_overlap;
+    };
+    frame::BundledFrame some = frame;
+    FrameMatches found = matches;
+    for (const std::size_t c : {2, 3}) {
+      some.cameras[c].state = image::ImageState::kMissing;
+      found[c].clear();
+    }
+    EXPECT_EQ(overlap(frame, matches), 1.0);
+    EXPECT_EQ(overlap(some, found), 1.0);
+    EXPECT_EQ(overlap(frame, matches), 1.0);
+    found[0].resize(found[0].size() / 2);
+    found[1].resize(found[1].size() / 2);
+    EXPECT_NEAR(overlap(some, found), 0.5, 0.02);
   }
 }
 

@@ -12,8 +12,12 @@ class PoseBetween : public ::testing::Test {
   PoseBetween() : world_(true_map(simulator(synthetic::ring_rig(1)), 1.2, 0.6)), pool_(1) {}
 
   std::optional<TrackResult> verify_place(frame::BundledFrame frame) {
-    const BetweenKeyframes early{std::make_shared<const frame::BundledFrame>(std::move(frame)), KeyframeId(0),
-                                 KeyframeId(1), world_.frames[0].frame.time_ns, world_.frames[1].frame.time_ns};
+    const BetweenKeyframes early{std::make_shared<const frame::BundledFrame>(std::move(frame)),
+                                 KeyframeId(0),
+                                 KeyframeId(1),
+                                 world_.frames[0].frame.time_ns,
+                                 world_.frames[1].frame.time_ns,
+                                 world_.map.shared_rig()};
     return pose_between(world_.map, early, {0.7}, {}, pool_);
   }
 

@@ -33,11 +33,12 @@ TEST(ReducedWork, EveryLevelIsLessThanTheOneBefore) {
 
 TEST(ReducedWork, AChangeOfTheLevelDoesNotLookLikeALossOfLandmarks) {
   TrackerState state;
-  state.references = {{KeyframeId(0), 1, 400, 200}, {KeyframeId(0), 1, 200, 100}};
+  state.references = {{KeyframeId(0), 1, 400, 300, 200}, {KeyframeId(0), 1, 200, 150, 100}};
   state.direct.best_inliers = {300, 150};
   change_level(0, 2, state);
   EXPECT_EQ(state.references[0].best_overlap, 200);
   EXPECT_EQ(state.references[1].best_overlap, 100);
+  EXPECT_EQ(state.references[0].best_own_overlap, 150);
   EXPECT_EQ(state.references[0].best_direct_overlap, 100);
   EXPECT_EQ(state.references[1].best_direct_overlap, 50);
   EXPECT_EQ(state.direct.best_inliers, (std::vector<int>{150, 75}));

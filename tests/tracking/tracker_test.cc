@@ -222,6 +222,17 @@ TEST(Tracker, AFrameWithoutAPoseForgetsThePendingKeyframe) {
   EXPECT_FALSE(run.state.pending);
 }
 
+// A video with repeated images has a frame without any after each one.
+TEST(Tracker, AFrameWithoutImagesKeepsThePendingKeyframe) {
+  TrackerRun run(synthetic::ring_rig(2));
+  for (int i = 0; i < 4; ++i) run.process(run.frame(i));
+  run.state.pending = {FrameId(3), run.state.track.anchored, run.store.snapshot()->keyframe_slots(), 0};
+  const std::vector<int> missing = {0, 1};
+  const FrameRecord record = run.process(run.sim.frame(FrameId(4), TrackerRun::time_s(4), missing).frame);
+  EXPECT_EQ(record.result.reason, LostReason::kNoImages);
+  EXPECT_TRUE(run.state.pending);
+}
+
 TEST(Tracker, KeepsThePoseFoundDirectlyIfTheFeaturesOfTheFrameGiveNone) {
   TrackerRun run(synthetic::ring_rig(2));
   for (int i = 0; i < 4; ++i) run.process(run.frame(i));
