@@ -24,23 +24,62 @@ std::vector<PlaneMatch> plane_matches(const EpipolarPose& given, std::span<const
   return out;
 }
 
-// One step of the least squares at a scale of the weights, rad.
-Eigen::Vector3d step(std::span<const PlaneMatch> matches, const Eigen::Matrix3d& correction, double scale,
-                     const PairRotationOptions& options) {
-  const double information = 1.0 / (options.tolerance * options.tolerance),
-               of_prior = 1.0 / (options.prior * options.prior);
-  const Eigen::Vector3d so_far = geometry::so3_log(Eigen::Quaterniond(correction));
-  Eigen::Matrix3d H = of_prior * Eigen::Matrix3d::Identity();
-  Eigen::Vector3d g = of_prior * so_far;
+// Unknowns: the rotation of camera b, and the relative error of its focal length.
+struct Estimate {
+  Eigen::Matrix3d correction = Eigen::Matrix3d::Identity();
+  double focal_error = 0;
+};
+
+// The axis of the rotation of camera b that changes mainly disparities.
+Eigen::Vector3d disparity_axis(const EpipolarPose& given, std::span<const PlaneMatch> matches) {
+  Eigen::Vector3d view = Eigen::Vector3d::Zero();
+  for (const PlaneMatch& m : matches) view += m.b;
+  return view.cross(given.t_b_a).stableNormalized();
+}
+
+// One step of the least squares at a scale of the weights, rad. The rotation about the axis `fixed` stays as given.
+void advance(std::span<const PlaneMatch> matches, double scale, const Eigen::Vector3d& fixed,
+             const PairRotationOptions& options, Estimate& estimate) {
+  constexpr double kFixed = 1e6;  // factor of the information
+  const double information = 1.0 / (options.tolerance * options.tolerance);
+  const Eigen::Vector4d of_prior(options.prior, options.prior, options.prior, options.focal_error);
+  Eigen::Matrix4d prior = of_prior.cwiseAbs2().cwiseInverse().asDiagonal();
+  prior.topLeftCorner<3, 3>() += kFixed * information * fixed * fixed.transpose();
+  Eigen::Vector4d so_far;
+  so_far << geometry::so3_log(Eigen::Quaterniond(estimate.correction)), estimate.focal_error;
+  Eigen::Matrix4d H = prior;
+  Eigen::Vector4d g = prior * so_far;
   for (const PlaneMatch& m : matches) {
-    const Eigen::Vector3d normal = correction * m.normal;
-    const double distance = m.b.dot(normal);
+    const Eigen::Vector3d normal = estimate.correction * m.normal, outward(m.b.x(), m.b.y(), 0);
+    const Eigen::Vector3d b = m.b - estimate.focal_error * outward;
+    const double distance = b.dot(normal);
     const double ratio = distance / scale, weight = information / std::pow(1 + ratio * ratio, 2);
-    const Eigen::Vector3d J = normal.cross(m.b);
+    Eigen::Vector4d J;
+    J << normal.cross(b), -outward.dot(normal);
     H += weight * J * J.transpose();
     g += weight * distance * J;
   }
-  return -H.ldlt().solve(g);
+  const Eigen::Vector4d step = -H.ldlt().solve(g);
+  estimate.correction = geometry::so3_exp(step.head<3>()).toRotationMatrix() * estimate.correction;
+  estimate.focal_error += step(3);
+}
+
+PairRotation solve(const EpipolarPose& given, std::span<const BearingPair> pairs, std::span<const PlaneMatch> matches,
+                   const Eigen::Vector3d& fixed, const PairRotationOptions& options) {
+  constexpr double kFirstScale = 0.07, kShrink = 0.7;  // rad, per step
+  constexpr int kLastSteps = 5;
+  Estimate estimate;
+  for (double scale = kFirstScale; scale > options.tolerance; scale *= kShrink)
+    advance(matches, scale, fixed, options, estimate);
+  for (int i = 0; i < kLastSteps; ++i) advance(matches, options.tolerance, fixed, options, estimate);
+  PairRotation out;
+  out.correction = estimate.correction;
+  out.agreed = epipolar_agreement(given, pairs, options.tolerance).all;
+  const EpipolarAgreement found =
+      epipolar_agreement({out.correction * given.R_b_a, out.correction * given.t_b_a}, pairs, options.tolerance);
+  out.agree = found.all;
+  out.with_depth = found.with_depth;
+  return out;
 }
 
 }  // namespace
@@ -60,22 +99,11 @@ EpipolarAgreement epipolar_agreement(const EpipolarPose& pose, std::span<const B
 
 PairRotation pair_rotation(const EpipolarPose& given, std::span<const BearingPair> pairs,
                            const PairRotationOptions& options) {
-  constexpr double kFirstScale = 0.07, kShrink = 0.7;  // rad, per step
-  constexpr int kLastSteps = 5;
+  constexpr double kClearly = 1.15;  // factor of the number of matches
   const std::vector<PlaneMatch> matches = plane_matches(given, pairs);
-  PairRotation out;
-  const auto advance = [&](double scale) {
-    const Eigen::Vector3d omega = step(matches, out.correction, scale, options);
-    out.correction = geometry::so3_exp(omega).toRotationMatrix() * out.correction;
-  };
-  for (double scale = kFirstScale; scale > options.tolerance; scale *= kShrink) advance(scale);
-  for (int i = 0; i < kLastSteps; ++i) advance(options.tolerance);
-  out.agreed = epipolar_agreement(given, pairs, options.tolerance).all;
-  const EpipolarAgreement found =
-      epipolar_agreement({out.correction * given.R_b_a, out.correction * given.t_b_a}, pairs, options.tolerance);
-  out.agree = found.all;
-  out.with_depth = found.with_depth;
-  return out;
+  const PairRotation kept = solve(given, pairs, matches, disparity_axis(given, matches), options);
+  const PairRotation free = solve(given, pairs, matches, Eigen::Vector3d::Zero(), options);
+  return free.agree > kClearly * kept.agree ? free : kept;
 }
 
 }  // namespace bslam::estimators

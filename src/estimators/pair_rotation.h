@@ -7,8 +7,9 @@
 namespace bslam::estimators {
 
 struct PairRotationOptions {
-  double tolerance = 4e-3;  // rad, largest distance from the epipolar plane of a match that agrees
-  double prior = 0.035;     // rad, standard deviation of the given rotation, per axis
+  double tolerance = 4e-3;    // rad, largest distance from the epipolar plane of a match that agrees
+  double prior = 0.035;       // rad, standard deviation of the given rotation, per axis
+  double focal_error = 0.02;  // standard deviation of the ratio of the focal lengths, relative to the given one
 };
 
 struct PairRotation {
@@ -26,9 +27,11 @@ struct EpipolarAgreement {
 EpipolarAgreement epipolar_agreement(const EpipolarPose& pose, std::span<const BearingPair> pairs, double tolerance);
 
 // Minimises the distances of the bearings b from the epipolar planes of a, by iteratively reweighted least squares with
-// the weights of Geman and McClure, whose scale decreases from several degrees to the tolerance. Directions that the
-// matches do not determine, mainly the rotation that changes disparities, stay as given because of the prior. More than
-// half of the pairs must be correct.
+// the weights of Geman and McClure, whose scale decreases from several degrees to the tolerance. An error of the focal
+// lengths is estimated as well, so that it is not taken for a rotation. The rotation about the axis that is
+// perpendicular to the baseline and the view changes mainly disparities. Small errors of the intrinsics, which are
+// common to all matches, look like a large one of it, so that it stays as given unless clearly more matches agree with
+// another one. More than half of the pairs must be correct.
 PairRotation pair_rotation(const EpipolarPose& given, std::span<const BearingPair> pairs,
                            const PairRotationOptions& options);
 

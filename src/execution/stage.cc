@@ -27,11 +27,15 @@ StageTask StageTask::of_input(Stage stage, std::int32_t input) {
 
 namespace {
 
-constexpr std::size_t kFirstCalibration = 8, kSecondCalibration = 12;  // keyframes
+// The numbers of keyframes before the first calibrations. The first one finds large errors, which would spoil the map.
+constexpr std::size_t kFirstCalibration = 4, kSecondCalibration = 8, kThirdCalibration = 12;
 
 // The number of keyframes at which the next calibration is due. Each further quarter of observations makes the
 // estimate of a wrong calibration, and so the poses of the following frames, noticeably more accurate.
-std::size_t next_calibration(std::size_t due) { return due < kSecondCalibration ? kSecondCalibration : due + due / 4; }
+std::size_t next_calibration(std::size_t due) {
+  if (due < kThirdCalibration) return due < kSecondCalibration ? kSecondCalibration : kThirdCalibration;
+  return due + due / 4;
+}
 
 // The number of keyframe slots from the first keyframe of the map to this one. Maps that were discarded before do not
 // count.
@@ -52,16 +56,20 @@ std::optional<int> calibration_due(KeyframeId keyframe, const map::BundledMap& m
   return std::nullopt;
 }
 
-bool before_first_calibration(KeyframeId keyframe, const map::BundledMap& map) {
-  return slots_before(keyframe, map) <= kFirstCalibration;
+bool calibration_compared(const map::BundledMap& map) {
+  return slots_before(KeyframeId(map.keyframe_slots()), map) > kFirstCalibration;
+}
+
+bool calibration_uncertain(KeyframeId keyframe, const map::BundledMap& map) {
+  return slots_before(keyframe, map) <= kSecondCalibration;
 }
 
 bool awaited(const StageTask& task, const map::BundledMap& newest) {
-  constexpr int kVerdicts = 2, kRefinements = 8;  // calibrations
+  constexpr int kVerdicts = 3, kRefinements = 9;  // calibrations
   switch (task.stage) {
     case Stage::kKeyframe:
     case Stage::kMap:
-      return slots_before(KeyframeId(newest.keyframe_slots()), newest) <= kSecondCalibration + 1;
+      return slots_before(KeyframeId(newest.keyframe_slots()), newest) <= kThirdCalibration + 1;
     case Stage::kCalibrate: {
       const int number = calibration_due(task.keyframe, newest).value_or(kRefinements);
       return number < kVerdicts || (newest.rig_deviation() && number < kRefinements);

@@ -77,12 +77,16 @@ std::vector<StageTask> following(const StageTask& task, const map::BundledMap& n
 // size of the map and its benefit decreases.
 std::optional<int> calibration_due(KeyframeId keyframe, const map::BundledMap& map);
 
-// Whether no calibration of the map has been finished when this keyframe is mapped.
-bool before_first_calibration(KeyframeId keyframe, const map::BundledMap& map);
+// Whether the calibration has been compared with the images of the map: the first one was due before.
+bool calibration_compared(const map::BundledMap& map);
+
+// Whether the calibration still counts as uncertain when this keyframe is mapped, since at most the first one was
+// finished before, which finds only large errors.
+bool calibration_uncertain(KeyframeId keyframe, const map::BundledMap& map);
 
 // Whether the next frame waits for a task (ExecutionOptions::await_calibration). Tracking with a wrong calibration
 // loses observations, cameras or the scale, which no later adjustment brings back. The first keyframes are therefore
-// mapped one after the other until two calibrations have shown whether the images agree; if they do not, some further
+// mapped one after the other until three calibrations have shown whether the images agree; if they do not, some further
 // calibrations are waited for as well. `newest` is the newest version of the map.
 bool awaited(const StageTask& task, const map::BundledMap& newest);
 

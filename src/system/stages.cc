@@ -14,7 +14,7 @@ execution::StageResult map_keyframe(const Config& config, const std::shared_ptr<
   if (!base->alive(task.keyframe)) return {};
   map::MapDraft draft(base);
   mapping::map_keyframe(task.keyframe, config.mapping, config.feature_model(), draft, std::move(stop),
-                        execution::before_first_calibration(task.keyframe, *base) ? rig_prior : nullptr);
+                        execution::calibration_uncertain(task.keyframe, *base) ? rig_prior : nullptr);
   return {std::move(draft), {}};
 }
 
@@ -46,8 +46,19 @@ bool left_out(const calibration::CalibrationOptions& options, const map::Bundled
               KeyframeId first, KeyframeId keyframe) {
   if (options.refine == calibration::Refine::kTrue || calibration::replaced(map.rig(), given_rig)) return false;
   if (first.index() > 0 || map.scale_deviation() > 0) return false;
+  constexpr int kFirst = 3, kEvery = 4;
   const int number = execution::calibration_due(keyframe, map).value_or(0);
-  return number >= 2 && number % 4 != 1;
+  return number >= kFirst && (number + 1) % kEvery != kFirst;
+}
+
+// The options of a calibration, by its number. The first one has few images, and is only used if the given calibration
+// is so wrong that it spoils the map: if it doubles the root mean square of the reprojection errors.
+calibration::CalibrationOptions options_of(int number, calibration::CalibrationOptions options) {
+  constexpr double kLargeExcess = 3.0;
+  if (number > 0) return options;
+  options.refine = calibration::Refine::kAuto;
+  options.inconsistent_excess = std::max(options.inconsistent_excess, kLargeExcess);
+  return options;
 }
 
 // Replaces the rig by its estimate from the map so far, and adjusts the map with it. The newest keyframe keeps its
@@ -56,10 +67,12 @@ execution::StageResult calibrate(const Config& config, const camera::Rig& given_
                                  const execution::StageTask& task, const map::MapSnapshot& base,
                                  const std::stop_token& stop) {
   if (left_out(config.calibration, *base, given_rig, first, task.keyframe)) return {};
-  auto refinement =
-      calibration::refine_if_accepted(*base, given_rig, config.calibration, config.feature_model(), stop, first);
+  const int number = execution::calibration_due(task.keyframe, *base).value_or(0);
+  const auto options = options_of(number, config.calibration);
+  auto refinement = calibration::refine_if_accepted(*base, given_rig, options, config.feature_model(), stop, first);
   if (!refinement) return {};
-  calibration::keep_scale(config.calibration, *refinement);
+  // The path before the first one is too short to tell the scale better than the baselines.
+  if (number > 0) calibration::keep_scale(options, *refinement);
   map::MapDraft draft(base);
   use_calibration(*refinement, config, draft, stop);
   const KeyframeId newest = base->newest_keyframe();

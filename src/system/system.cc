@@ -111,7 +111,9 @@ Result<FrameRecord> System::process(const image::ImageBundle& images) {
     outcome.record.stages.push_back({"wait", watch.ms()});
     outcome.record.frame_ms += watch.ms();
   }
-  const bool wrong_map = doubt_ && doubt_->update(outcome.record, *outcome.seen);
+  const bool compared =
+      config_.calibration.refine == calibration::Refine::kFalse || execution::calibration_compared(*outcome.seen);
+  const bool wrong_map = doubt_ && doubt_->update(outcome.record, *outcome.seen, compared);
   frames_.push_back(std::move(outcome.record));
   mark_created_keyframes();
   if (wrong_map) discard_map();

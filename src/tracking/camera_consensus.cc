@@ -198,13 +198,16 @@ void update_reobservation_ratio(CameraConsensusState& camera, const LandmarkCoun
   if (reobserved.expected >= options.min_expected) camera.reobservation_ratio = reobserved.ratio();
 }
 
-void update_exclusion(CameraConsensusState& camera, const LandmarkCounts& view, TimeNs time_ns,
+void update_exclusion(CameraConsensusState& camera, const LandmarkCounts& view, double ratio_of_used, TimeNs time_ns,
                       const ConsensusOptions& options) {
+  constexpr double kComparable = 0.25;  // fraction of the ratio of a camera in use
   camera.landmarks.clear();
   if (!std::exchange(camera.excluded, true)) camera.last_judged_ns = camera.excluded_since_ns = time_ns;
   const bool judged = view.expected >= options.min_expected;
   if (judged) {
-    camera.consistent_frames = view.ratio() >= options.readmission_ratio ? camera.consistent_frames + 1 : 0;
+    const double needed = std::min(options.readmission_ratio, kComparable * ratio_of_used);
+    const bool consistent = view.found > 0 && view.ratio() >= needed;
+    camera.consistent_frames = consistent ? camera.consistent_frames + 1 : 0;
     camera.last_judged_ns = time_ns;
   }
   const bool expired = to_seconds(time_ns - camera.last_judged_ns) >= options.forget_after_s;
@@ -215,8 +218,10 @@ bool due_for_retry(const CameraConsensusState& camera, TimeNs time_ns, const Con
   return camera.excluded && to_seconds(time_ns - camera.excluded_since_ns) >= options.retry_after_s;
 }
 
-void retry(CameraConsensusState& camera, const LandmarkCounts& wide, TimeNs time_ns, const ConsensusOptions& options) {
-  if (wide.expected >= options.min_expected && wide.ratio() >= options.readmission_ratio) {
+void retry(CameraConsensusState& camera, const LandmarkCounts& view, const LandmarkCounts& wide, TimeNs time_ns,
+           const ConsensusOptions& options) {
+  const bool many = wide.expected >= options.min_expected && wide.ratio() >= options.readmission_ratio;
+  if (many && view.found < wide.found / 2) {
     camera.excluded_since_ns = time_ns;
   } else {
     camera = readmitted(camera.established);

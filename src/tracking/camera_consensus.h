@@ -89,16 +89,18 @@ void update_reobservation_ratio(CameraConsensusState& camera, const LandmarkCoun
                                 const ConsensusOptions& options);
 
 // Excludes a camera, or readmits an excluded one if it is consistent with the map again or could not be checked for
-// `forget_after_s`. `view`: landmarks of the map in its view in the frame of `time_ns`.
-void update_exclusion(CameraConsensusState& camera, const LandmarkCounts& view, TimeNs time_ns,
+// `forget_after_s`. `view`: landmarks of the map in its view in the frame of `time_ns`. `ratio_of_used`: the largest
+// ratio of a camera in use. Where even such a camera finds few of the many landmarks of the map, fewer suffice.
+void update_exclusion(CameraConsensusState& camera, const LandmarkCounts& view, double ratio_of_used, TimeNs time_ns,
                       const ConsensusOptions& options);
 
 // Returns true if a camera has been excluded for so long that it is to be readmitted, unless its view is displaced.
 bool due_for_retry(const CameraConsensusState& camera, TimeNs time_ns, const ConsensusOptions& options);
 
-// Readmits such a camera unless its view is displaced. `wide`: landmarks of the map in its view, searched for in wide
-// windows; the view is displaced if many of them are found there.
-void retry(CameraConsensusState& camera, const LandmarkCounts& wide, TimeNs time_ns, const ConsensusOptions& options);
+// Readmits such a camera unless its view is displaced. `view`, `wide`: landmarks of the map in its view, searched for
+// in narrow and in wide windows; the view is displaced if many of them are found in the wide ones only.
+void retry(CameraConsensusState& camera, const LandmarkCounts& view, const LandmarkCounts& wide, TimeNs time_ns,
+           const ConsensusOptions& options);
 
 // Removes a camera's keypoints from a frame as if it had delivered no image.
 void remove_camera(const camera::Rig& rig, std::size_t camera, double min_parallax, double max_chi2,

@@ -43,8 +43,9 @@ MapDoubt::MapDoubt(const camera::Rig& rig) {
   for (std::size_t c = 0; c < rig.size(); ++c) overlapping_.push_back(overlaps_any(rig, c));
 }
 
-bool MapDoubt::update(const FrameRecord& record, const map::BundledMap& seen) {
-  const TrackResult& result = record.result;
+bool MapDoubt::update(const FrameRecord& record, const map::BundledMap& seen, bool calibration_compared) {
+  TrackResult result = record.result;
+  result.contest.undecided &= calibration_compared;
   while (!undecided_ns_.empty() && to_seconds(result.time_ns - undecided_ns_.front()) > kContestedWithin_s)
     undecided_ns_.pop_front();
   const bool lost_in_it = disowned(result, seen);

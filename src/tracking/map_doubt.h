@@ -27,8 +27,10 @@ class MapDoubt {
   explicit MapDoubt(const camera::Rig& rig);
 
   // Considers the record of the next frame, which was tracked in the version `seen` of the map. Returns true if the map
-  // is to be discarded; the following frames then belong to another map.
-  bool update(const FrameRecord& record, const map::BundledMap& seen);
+  // is to be discarded; the following frames then belong to another map. `calibration_compared`: the calibration agrees
+  // with the images, or was refined. Before, poses may be undecided because it is wrong: landmarks at wrong distances
+  // look like things that move.
+  bool update(const FrameRecord& record, const map::BundledMap& seen, bool calibration_compared);
 
  private:
   bool is_new(TimeNs time_ns, const map::BundledMap& seen, std::size_t max_keyframes) const;

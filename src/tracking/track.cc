@@ -313,16 +313,30 @@ frame::BundledFrame refined_frame(const camera::Rig& rig, const Coarse& coarse, 
   return frame;
 }
 
+// The largest fraction of the landmarks in view that a camera in use matched. Of the landmarks of the local view, those
+// that the coarse pose was estimated from are not part of `fine.views`.
+double largest_ratio_of_used(const Coarse& coarse, const Fine& fine, int min_expected) {
+  double largest = 0;
+  for (std::size_t c = 0; c < fine.views.size(); ++c) {
+    const int known = c < coarse.matches.size() ? static_cast<int>(coarse.matches[c].size()) : 0;
+    const LandmarkCounts all{fine.views[c].expected + known, fine.views[c].found + known};
+    if (!coarse.excluded[c] && all.expected >= min_expected) largest = std::max(largest, all.ratio());
+  }
+  return largest;
+}
+
 // Updates the states of the cameras for the next frame.
 void update_cameras(const Coarse& coarse, const Fine& fine, const ConsensusOptions& options, TrackOutput& out) {
   const frame::BundledFrame& frame = out.frame;
+  const double ratio_of_used = largest_ratio_of_used(coarse, fine, options.min_expected);
   for (std::size_t c = 0; c < out.state.cameras.size(); ++c) {
     CameraConsensusState& camera = out.state.cameras[c];
     out.result.cameras[c].excluded = coarse.excluded[c];
     if (coarse.excluded[c]) {
-      update_exclusion(camera, fine.views[c], frame.time_ns, options);
+      update_exclusion(camera, fine.views[c], ratio_of_used, frame.time_ns, options);
       const bool tried = !fine.wide.empty() && fine.wide[c].expected > 0;
-      if (tried && due_for_retry(camera, frame.time_ns, options)) retry(camera, fine.wide[c], frame.time_ns, options);
+      if (tried && due_for_retry(camera, frame.time_ns, options))
+        retry(camera, fine.views[c], fine.wide[c], frame.time_ns, options);
       continue;
     }
     const bool present = frame.cameras[c].state == image::ImageState::kPresent;

@@ -43,6 +43,37 @@ TEST(PairRotation, IsFoundAmongWrongMatches) {
   }
 }
 
+// Points across the epipolar planes by y (1 + p x), as by wrong tangential distortion: to 300 matches with independent
+// errors, this is a rotation by a degree, which would change all disparities by ten pixels.
+TEST(PairRotation, ErrorsOfTheIntrinsicsAreNotTakenForARotationThatChangesDisparities) {
+  Random random(5);
+  const EpipolarPose given{Eigen::Matrix3d::Identity(), -Eigen::Vector3d::UnitX()};
+  for (const double focal_error : {0.0, 0.02}) {
+    const Eigen::Vector3d error_deg(0.5, 0, 0.5);
+    const Eigen::Matrix3d error = geometry::so3_exp(error_deg * geometry::radians(1)).toRotationMatrix();
+    std::vector<BearingPair> pairs = matches_of({error, error * given.t_b_a}, 0.11, 4, random);
+    for (BearingPair& pair : pairs) {
+      const double x = pair.b.x() / pair.b.z(), y = pair.b.y() / pair.b.z();
+      pair.b = Eigen::Vector3d((1 + focal_error) * x, (1 + focal_error) * y + 0.015 * x * y, 1).normalized();
+    }
+    const PairRotation found = pair_rotation(given, pairs, {.tolerance = 4e-3});
+    const Eigen::Vector3d left =
+        geometry::so3_log(Eigen::Quaterniond(found.correction.transpose() * error)) / geometry::radians(1);
+    EXPECT_LT(std::abs(left.x()), 0.05) << focal_error;
+    EXPECT_LT(std::abs(left.z()), 0.1) << focal_error;
+    EXPECT_LT(std::abs(left.y()), 0.05) << focal_error;
+  }
+}
+
+TEST(PairRotation, OneThatChangesDisparitiesIsFoundIfItIsLarge) {
+  Random random(6);
+  const EpipolarPose given{Eigen::Matrix3d::Identity(), -Eigen::Vector3d::UnitX()};
+  const Eigen::Matrix3d error = geometry::so3_exp(Eigen::Vector3d(0.02, 0.08, 0)).toRotationMatrix();
+  const auto pairs = matches_of({error, error * given.t_b_a}, 0.11, 0, random);
+  const PairRotation found = pair_rotation(given, pairs, {.tolerance = 3e-3});
+  EXPECT_LT(geometry::so3_log(Eigen::Quaterniond(found.correction.transpose() * error)).norm(), 0.01);
+}
+
 // Exchanged cameras satisfy the epipolar geometry, but with points behind them.
 TEST(PairRotation, PointsBehindTheCamerasDoNotAgree) {
   Random random(4);

@@ -38,6 +38,7 @@ TEST(Stage, FramesAwaitTheFirstCalibrations) {
   map::BundledMap empty = world.empty_map();
   EXPECT_TRUE(awaited({Stage::kMap, KeyframeId(3)}, empty));
   EXPECT_TRUE(awaited({Stage::kKeyframe, KeyframeId(), FrameId(3)}, empty));
+  EXPECT_TRUE(awaited({Stage::kCalibrate, KeyframeId(4)}, empty));
   EXPECT_TRUE(awaited({Stage::kCalibrate, KeyframeId(12)}, empty));
   EXPECT_FALSE(awaited({Stage::kCalibrate, KeyframeId(18)}, empty));
   EXPECT_FALSE(awaited({Stage::kLoop, KeyframeId(3)}, empty));
@@ -48,15 +49,18 @@ TEST(Stage, KeyframesOfADiscardedMapDoNotCount) {
   const StageWorld world;
   map::MapStore store{world.empty_map()};
   for (int i = 0; i < 20; ++i) store.commit(world.with_keyframe(FrameId(i), store.snapshot()));
-  EXPECT_EQ(calibration_due(KeyframeId(12), *store.snapshot()), 1);
+  EXPECT_EQ(calibration_due(KeyframeId(12), *store.snapshot()), 2);
   EXPECT_FALSE(calibration_due(KeyframeId(28), *store.snapshot()).has_value());
-  EXPECT_FALSE(before_first_calibration(KeyframeId(24), *store.snapshot()));
+  EXPECT_FALSE(calibration_uncertain(KeyframeId(24), *store.snapshot()));
+  EXPECT_TRUE(calibration_compared(*store.snapshot()));
   store.restart();
   store.commit(world.with_keyframe(FrameId(20), store.snapshot()));
   ASSERT_EQ(store.snapshot()->newest_keyframe(), KeyframeId(20));
-  EXPECT_EQ(calibration_due(KeyframeId(28), *store.snapshot()), 0);
+  EXPECT_EQ(calibration_due(KeyframeId(24), *store.snapshot()), 0);
+  EXPECT_EQ(calibration_due(KeyframeId(28), *store.snapshot()), 1);
   EXPECT_FALSE(calibration_due(KeyframeId(23), *store.snapshot()).has_value());
-  EXPECT_TRUE(before_first_calibration(KeyframeId(24), *store.snapshot()));
+  EXPECT_TRUE(calibration_uncertain(KeyframeId(24), *store.snapshot()));
+  EXPECT_FALSE(calibration_compared(*store.snapshot()));
   EXPECT_TRUE(awaited({Stage::kCalibrate, KeyframeId(28)}, *store.snapshot()));
 }
 

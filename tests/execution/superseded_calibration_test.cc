@@ -15,7 +15,7 @@ StageResult scaled(const map::MapSnapshot& base, double factor) {
   return {std::move(draft), {}};
 }
 
-// kLoop scales the map by 2 at keyframe 12, at which the second calibration is due. kCalibrate scales it by 3; before
+// kLoop scales the map by 2 at keyframe 12, at which the third calibration is due. kCalibrate scales it by 3; before
 // the loop is closed it runs until it is stopped.
 StageFunctions scaling_stages() {
   StageFunctions functions;
@@ -42,7 +42,7 @@ Journal run(StageExecutor& executor, MapGate& gate) {
   }
   executor.drain();
   executor.end();
-  EXPECT_DOUBLE_EQ(gate.newest()->keyframe(KeyframeId(0)).scale, 18.0);
+  EXPECT_DOUBLE_EQ(gate.newest()->keyframe(KeyframeId(0)).scale, 54.0);
   return gate.journal();
 }
 
@@ -65,7 +65,7 @@ TEST(SupersededCalibration, AllCalibrationsAreCommittedAfterTheLoop) {
       EXPECT_TRUE(e.committed);
       EXPECT_GE(e.base, loop);
     }
-    EXPECT_EQ(calibrations, (std::vector<std::int32_t>{8, 12})) << "mode " << static_cast<int>(mode);
+    EXPECT_EQ(calibrations, (std::vector<std::int32_t>{4, 8, 12})) << "mode " << static_cast<int>(mode);
     map::MapStore store{StageWorld().empty_map()};
     MapGate gate(store);
     const auto replay = make_replay_executor(journal, gate, {scaling_stages(), {}, {}});

@@ -157,11 +157,17 @@ TEST_F(DirectTracking, AlignsAsManyLandmarksInAnImageIfAnotherCameraHasNone) {
     camera.landmarks = state_.landmarks;
     camera.last_image_ns = state_.time_ns;
   }
-  options_.direct.per_rig = 80;
+  options_.direct.per_rig = 160;
+  options_.direct.coarse_per_image = 300;
   options_.direct.min_per_image = 20;
-  const auto searched = [&] { return track().output->result.cameras[0].keypoints; };
+  const auto searched = [&] {
+    const auto found = track();
+    EXPECT_TRUE(found.output.has_value());
+    return found.output ? found.output->result.cameras[0].keypoints : 0;
+  };
   const int with_all = searched();
-  EXPECT_EQ(with_all, options_.direct.per_rig / static_cast<int>(frame_.cameras.size()));
+  EXPECT_LE(with_all, options_.direct.per_rig / static_cast<int>(frame_.cameras.size()));
+  EXPECT_GT(with_all, 40);
   for (std::size_t c = 1; c < frame_.cameras.size(); ++c) frame_.cameras[c].state = image::ImageState::kMissing;
   EXPECT_EQ(searched(), with_all);
   state_.cameras[1].last_image_ns -= 1'000'000'000;  // it failed

@@ -34,26 +34,44 @@ TEST(CameraConsensus, FlagsCamerasThatLoseTheirLandmarksWhileAnotherDoesNot) {
 TEST(CameraConsensus, ReadmitsAfterConsecutiveConsistentFrames) {
   const ConsensusOptions options;
   CameraConsensusState camera;
-  update_exclusion(camera, {100, 0}, 0, options);
+  update_exclusion(camera, {100, 0}, 1.0, 0, options);
   for (int i = 1; i < options.readmit_after; ++i) {
-    update_exclusion(camera, {100, 50}, 0, options);
+    update_exclusion(camera, {100, 50}, 1.0, 0, options);
     EXPECT_TRUE(camera.excluded);
   }
-  update_exclusion(camera, {100, 1}, 0, options);  // restarts the count
+  update_exclusion(camera, {100, 1}, 1.0, 0, options);  // restarts the count
   for (int i = 0; i < options.readmit_after; ++i) {
     EXPECT_TRUE(camera.excluded);
-    update_exclusion(camera, {100, 50}, 0, options);
+    update_exclusion(camera, {100, 50}, 1.0, 0, options);
   }
+  EXPECT_FALSE(camera.excluded);
+}
+
+// Of a large map even a camera in use finds few landmarks.
+TEST(CameraConsensus, ReadmitsACameraThatFindsAsManyLandmarksAsAnotherOne) {
+  const ConsensusOptions options;
+  for (const int found : {1, 10}) {
+    CameraConsensusState camera;
+    for (int k = 0; k < options.readmit_after; ++k) update_exclusion(camera, {100, found}, 0.2, k, options);
+    EXPECT_EQ(camera.excluded, found == 1) << found;
+  }
+}
+
+TEST(CameraConsensus, AViewWhoseLandmarksAreInTheirPlaceIsNotDisplaced) {
+  const ConsensusOptions options;
+  CameraConsensusState camera;
+  update_exclusion(camera, {100, 2}, 1.0, 0, options);
+  retry(camera, {100, 14}, {100, 16}, from_seconds(options.retry_after_s), options);
   EXPECT_FALSE(camera.excluded);
 }
 
 TEST(CameraConsensus, ReadmitsACameraThatCannotBeChecked) {
   const ConsensusOptions options;
   CameraConsensusState camera;
-  update_exclusion(camera, {3, 0}, 0, options);
-  update_exclusion(camera, {3, 0}, from_seconds(options.forget_after_s - 0.1), options);
+  update_exclusion(camera, {3, 0}, 1.0, 0, options);
+  update_exclusion(camera, {3, 0}, 1.0, from_seconds(options.forget_after_s - 0.1), options);
   EXPECT_TRUE(camera.excluded);
-  update_exclusion(camera, {3, 0}, from_seconds(options.forget_after_s), options);
+  update_exclusion(camera, {3, 0}, 1.0, from_seconds(options.forget_after_s), options);
   EXPECT_FALSE(camera.excluded);
 }
 
@@ -73,11 +91,11 @@ TEST(CameraConsensus, RetriesACameraAfterALongTimeUnlessItsViewIsDisplaced) {
   const TimeNs later = from_seconds(options.retry_after_s);
   for (const bool displaced : {false, true}) {
     CameraConsensusState camera;
-    update_exclusion(camera, {100, 2}, 0, options);
+    update_exclusion(camera, {100, 2}, 1.0, 0, options);
     EXPECT_FALSE(due_for_retry(camera, later - 1, options));
-    update_exclusion(camera, {100, 2}, later, options);
+    update_exclusion(camera, {100, 2}, 1.0, later, options);
     ASSERT_TRUE(due_for_retry(camera, later, options));
-    retry(camera, {100, displaced ? 60 : 3}, later, options);
+    retry(camera, {100, 2}, {100, displaced ? 60 : 3}, later, options);
     EXPECT_EQ(camera.excluded, displaced);
     EXPECT_FALSE(due_for_retry(camera, later + 1, options));
     EXPECT_EQ(due_for_retry(camera, 2 * later, options), displaced);
@@ -142,8 +160,8 @@ TEST(CameraConsensus, DoesNotFlagACameraThatIsNotEstablished) {
   EXPECT_EQ(conflicting_cameras({{100, 20}, {33, 7}}, cameras, {}), (std::vector<std::uint8_t>{1, 0}));
   cameras[1].established = true;
   EXPECT_EQ(conflicting_cameras({{100, 95}, {33, 7}}, cameras, {}), (std::vector<std::uint8_t>{0, 1}));
-  update_exclusion(cameras[1], {100, 2}, 0, {});
-  for (int k = 1; k <= ConsensusOptions{}.readmit_after; ++k) update_exclusion(cameras[1], {100, 60}, k, {});
+  update_exclusion(cameras[1], {100, 2}, 1.0, 0, {});
+  for (int k = 1; k <= ConsensusOptions{}.readmit_after; ++k) update_exclusion(cameras[1], {100, 60}, 1.0, k, {});
   EXPECT_FALSE(cameras[1].excluded);
   EXPECT_TRUE(cameras[1].established);
 }

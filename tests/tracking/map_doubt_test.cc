@@ -46,9 +46,11 @@ class DoubtfulRun {
   bool start(double time_s) {
     map::BundledMap before(world_.map.shared_rig());
     before.set_scale(scale_);
-    return doubt_.update(tracked(time_s), before);
+    return doubt_.update(tracked(time_s), before, true);
   }
-  bool update(const FrameRecord& record) { return doubt_.update(record, world_.map); }
+  bool update(const FrameRecord& record, bool calibration_compared = true) {
+    return doubt_.update(record, world_.map, calibration_compared);
+  }
 
   static FrameRecord tracked(double time_s) {
     FrameRecord record;
@@ -136,6 +138,15 @@ TEST(MapDoubt, ManyUndecidedPosesWithinAShortTimeMakeANewMapWrong) {
     while (frames < 8 && !run.update(DoubtfulRun::undecided(1.0 + interval_s * frames))) ++frames;
     EXPECT_EQ(frames, interval_s < 0.2 ? static_cast<int>(kContestedFrames) : 8);
   }
+}
+
+// A wrong calibration looks like things that move, and is estimated from the map.
+TEST(MapDoubt, UndecidedPosesDoNotCountBeforeTheCalibrationWasCompared) {
+  DoubtfulRun run(map::Scale::kMetric);
+  run.start(1.0);
+  for (int i = 1; i < 8; ++i) EXPECT_FALSE(run.update(DoubtfulRun::undecided(1.0 + 0.05 * i), false));
+  for (int i = 8; i < 12; ++i) EXPECT_FALSE(run.update(DoubtfulRun::undecided(1.0 + 0.05 * i)));
+  EXPECT_TRUE(run.update(DoubtfulRun::undecided(1.6)));
 }
 
 TEST(MapDoubt, AfterSeveralContradictedMapsTheCamerasAreWrong) {
