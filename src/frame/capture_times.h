@@ -10,7 +10,8 @@
 
 namespace bslam::frame {
 
-// Maximum difference of capture times that counts as simultaneous: at 1 rad/s the image moves by about a pixel.
+// Maximum difference of capture times that counts as simultaneous: at 1 rad/s and a focal length of
+// 500 px the image moves by a pixel.
 constexpr TimeNs kTogetherNs = 2'000'000;
 
 // Flags the cameras to skip while the motion of the rig is unknown: those in `skipped`, and those whose image was not

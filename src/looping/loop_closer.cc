@@ -67,7 +67,7 @@ std::optional<PlaceMatch> LoopCloser::verify(KeyframeId keyframe, const map::Bun
 }
 
 // Submaps can have any relative pose, so no pose prior can reject a wrong match, only appearance. Therefore no other
-// place in the rest of the map may match equally well. The candidates are searched as for relocalisation, with lower
+// place in the same submap may match equally well. The candidates are searched as for relocalisation, with lower
 // thresholds, because a look-alike place observed by fewer keyframes would not be a candidate in addition to the right
 // one.
 bool LoopCloser::is_unambiguous(KeyframeId keyframe, const map::BundledMap& map, const PlaceMatch& place_match) const {

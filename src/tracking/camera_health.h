@@ -17,8 +17,8 @@ struct HealthOptions {
   int bright_level = 250;                 // minimum grey value of a bright pixel
   double black_pixel_ratio = 0.995;       // minimum fraction of dark pixels in a black image
   double over_exposed_pixel_ratio = 0.6;  // minimum fraction of bright pixels in an over-exposed image
-  // Minimum fraction of the contrast of a sharp edge that lies between two adjacent pixels; Gaussian blur of 3 px
-  // leaves 0.27.
+  // Minimum fraction of the contrast of a sharp edge that lies between two adjacent pixels; a step that is blurred by a
+  // Gaussian of standard deviation 1.5 px has 0.27.
   double sharp_slope = 0.28;
   double min_sharp_edge_ratio = 0.1;  // minimum fraction of sharp edges; an image with fewer is blurred
   int readmit_after = 3;  // consecutive good images until a camera is used again, if other cameras are available

@@ -44,12 +44,12 @@ MapDoubt::MapDoubt(const camera::Rig& rig) {
 }
 
 bool MapDoubt::update(const FrameRecord& record, const map::BundledMap& seen, bool calibration_compared) {
-  TrackResult result = record.result;
-  result.contest.undecided &= calibration_compared;
+  const TrackResult& result = record.result;
+  const bool undecided = result.contest.undecided && calibration_compared;
   while (!undecided_ns_.empty() && to_seconds(result.time_ns - undecided_ns_.front()) > kContestedWithin_s)
     undecided_ns_.pop_front();
   const bool lost_in_it = disowned(result, seen);
-  const bool wrong = !lost_in_it && contradicted(result, seen);
+  const bool wrong = !lost_in_it && contradicted(result, seen, undecided);
   contradictions_ += wrong;
   if (lost_in_it || wrong) {
     started_ns_.reset();
@@ -61,7 +61,7 @@ bool MapDoubt::update(const FrameRecord& record, const map::BundledMap& seen, bo
     started_ns_ = result.time_ns;
     first_keyframe_ = seen.keyframe_slots();
   }
-  if (result.contest.undecided) undecided_ns_.push_back(result.time_ns);
+  if (undecided) undecided_ns_.push_back(result.time_ns);
   return false;
 }
 
@@ -77,11 +77,12 @@ bool MapDoubt::disowned(const TrackResult& result, const map::BundledMap& seen) 
 }
 
 // Returns true if a recent initialisation was wrong, because most of its points were on a moving object: the cameras
-// that determine the scale contradict it, or the landmarks support two motions.
-bool MapDoubt::contradicted(const TrackResult& result, const map::BundledMap& seen) const {
+// that determine the scale contradict it, or the landmarks support two motions in many frames up to this one. Those of
+// a new map may be relative to a moving object.
+bool MapDoubt::contradicted(const TrackResult& result, const map::BundledMap& seen, bool undecided) const {
   if (contradictions_ >= kMaxContradictions || !is_new(result.time_ns, seen, kMaxContradictedMap)) return false;
   const bool metric = seen.scale() == map::Scale::kMetric;
-  return (metric && scale_contradicted(result)) || undecided(result);
+  return (metric && scale_contradicted(result)) || (undecided && 1 + undecided_ns_.size() >= kContestedFrames);
 }
 
 // Returns true if the cameras that overlap with others contradict the map, and only cameras without overlap agree with
@@ -95,11 +96,6 @@ bool MapDoubt::scale_contradicted(const TrackResult& result) const {
     contradicted |= result.cameras[c].excluded;
   }
   return contradicted;
-}
-
-// Returns true if many poses up to this frame were undecided: those of a new map may be relative to a moving object.
-bool MapDoubt::undecided(const TrackResult& result) const {
-  return result.contest.undecided && 1 + undecided_ns_.size() >= kContestedFrames;
 }
 
 }  // namespace bslam::tracking

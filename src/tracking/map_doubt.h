@@ -35,9 +35,8 @@ class MapDoubt {
  private:
   bool is_new(TimeNs time_ns, const map::BundledMap& seen, std::size_t max_keyframes) const;
   bool disowned(const TrackResult& result, const map::BundledMap& seen) const;
-  bool contradicted(const TrackResult& result, const map::BundledMap& seen) const;
+  bool contradicted(const TrackResult& result, const map::BundledMap& seen, bool undecided) const;
   bool scale_contradicted(const TrackResult& result) const;
-  bool undecided(const TrackResult& result) const;
 
   std::vector<std::uint8_t> overlapping_;  // per camera, whether it overlaps with any other
   std::optional<TimeNs> started_ns_;       // time of the first pose in the map; nullopt: it is not initialised

@@ -217,7 +217,7 @@ bool any_due_for_retry(const TrackerState& state, TimeNs time_ns, const Consensu
 
 struct Fine {
   solver::PoseSolution solution;
-  geometry::Vector6d twist;  // rad/s, m/s
+  geometry::Vector6d twist;  // rad/s, map units/s
   FrameMatches matches;      // inliers and outliers
   AlignedMatches aligned;    // for all of `matches`
   std::vector<LandmarkId> visible;

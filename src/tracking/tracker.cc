@@ -301,7 +301,7 @@ bool Tracker::keep_direct_pose(const Input& input, TrackOutcome& outcome) const 
 
 bool Tracker::gives_up(const FrontEndState& state, TimeNs time_ns) const {
   constexpr int kFew = 5;             // minimum number of frames in which the map is searched
-  constexpr double kFastest = 0.025;  // s; of frames that follow each other faster, a short disturbance spoils many
+  constexpr double kFastest = 0.025;  // s; at a higher rate, the time counts instead of the number of frames
   const double lost_s = to_seconds(time_ns - state.lost_since_ns);
   const int needed = options_.new_submap_after;
   return (state.frames_lost >= needed && lost_s >= kFastest * (needed - 1)) ||

@@ -40,8 +40,9 @@ Candidates coarsest_landmarks(const TrackInput& input, const frame::BundledFrame
                               const geometry::SE3& T_rig_world, const LastLandmarks& last, const DirectOptions& options,
                               ThreadPool& pool);
 
-// The landmarks to align at the pose: those of the last frame and of the local view, spread over the images. Cameras
-// align the same landmarks if they see them, so that their number depends little on which cameras have an image.
+// The landmarks to align at the pose: those of the last frame and of the local view, spread over the images.
+// Overlapping cameras align the same landmarks. The number per image depends on the cameras in use, not on those that
+// have an image in this frame.
 struct LocalLandmarks {
   std::shared_ptr<const LocalView> view;
   Candidates candidates;
