@@ -64,6 +64,7 @@ void advance(std::span<const PlaneMatch> matches, double scale, const Eigen::Vec
   estimate.focal_error += step(3);
 }
 
+// All members of the result except `agreed`.
 PairRotation solve(const EpipolarPose& given, std::span<const BearingPair> pairs, std::span<const PlaneMatch> matches,
                    const Eigen::Vector3d& fixed, const PairRotationOptions& options) {
   constexpr double kFirstScale = 0.07, kShrink = 0.7;  // rad, per step
@@ -74,7 +75,6 @@ PairRotation solve(const EpipolarPose& given, std::span<const BearingPair> pairs
   for (int i = 0; i < kLastSteps; ++i) advance(matches, options.tolerance, fixed, options, estimate);
   PairRotation out;
   out.correction = estimate.correction;
-  out.agreed = epipolar_agreement(given, pairs, options.tolerance).all;
   const EpipolarAgreement found =
       epipolar_agreement({out.correction * given.R_b_a, out.correction * given.t_b_a}, pairs, options.tolerance);
   out.agree = found.all;
@@ -103,7 +103,9 @@ PairRotation pair_rotation(const EpipolarPose& given, std::span<const BearingPai
   const std::vector<PlaneMatch> matches = plane_matches(given, pairs);
   const PairRotation kept = solve(given, pairs, matches, disparity_axis(given, matches), options);
   const PairRotation free = solve(given, pairs, matches, Eigen::Vector3d::Zero(), options);
-  return free.agree > kClearly * kept.agree ? free : kept;
+  PairRotation out = free.agree > kClearly * kept.agree ? free : kept;
+  out.agreed = epipolar_agreement(given, pairs, options.tolerance).all;
+  return out;
 }
 
 }  // namespace bslam::estimators

@@ -116,7 +116,7 @@ Motion Rebase::motion_since_base(KeyframeId edit_id) const {
 
 bool Rebase::operator()(const SetScale& op) {
   for (std::size_t k = base_.keyframe_slots(); op.scale == Scale::kMetric && k < others_keyframes_end_; ++k) {
-    if (map_.alive(KeyframeId(k)) && map_.root_of(KeyframeId(k)) == KeyframeId(k)) return false;
+    if (map_.alive(KeyframeId(k)) && !map_.keyframe(KeyframeId(k)).parent.valid()) return false;
   }
   map_.set_scale(op.scale, op.deviation);
   return true;

@@ -22,6 +22,10 @@ Matrix6d change_jacobian(const Vector6d& change) {
   return J;
 }
 
+bool is_displaced(const ExtrinsicPrior& prior, std::size_t camera) {
+  return !prior.displaced.empty() && prior.displaced[camera];
+}
+
 std::size_t num_with_baseline(const ExtrinsicPrior& prior) {
   return prior.with_baseline > 0 ? prior.with_baseline : prior.T_cam_rig.size();
 }
@@ -64,8 +68,7 @@ Rig RigValues::applied_to(const Rig& rig) const {
 
 Matrix6d covariance_of(const ExtrinsicPrior& prior, std::size_t camera) {
   const Vector3d axis = Vector3d::UnitZ(), axis_of_camera_0 = prior.T_cam_rig[camera].rotation() * Vector3d::UnitZ();
-  const bool displaced = !prior.displaced.empty() && prior.displaced[camera];
-  const double sigma_translation = (displaced ? kWiderIfDisplaced : 1.0) * prior.sigma_translation;
+  const double sigma_translation = (is_displaced(prior, camera) ? kWiderIfDisplaced : 1.0) * prior.sigma_translation;
   Matrix6d out = Matrix6d::Zero();
   out.topLeftCorner<3, 3>().diagonal().setConstant(prior.sigma_rotation * prior.sigma_rotation);
   out.bottomRightCorner<3, 3>().diagonal().setConstant(sigma_translation * sigma_translation);
@@ -79,7 +82,7 @@ std::vector<double> baseline_weights(const ExtrinsicPrior& prior) {
   double sum = 0.0;
   for (std::size_t c = 1; c < num_with_baseline(prior); ++c) {
     const Vector3d& t = prior.T_cam_rig[c].translation();
-    if ((!prior.displaced.empty() && prior.displaced[c]) || t.squaredNorm() == 0) continue;
+    if (is_displaced(prior, c) || t.squaredNorm() == 0) continue;
     out[c] = 1.0 / t.normalized().dot(covariance_of(prior, c).bottomRightCorner<3, 3>() * t.normalized());
     sum += out[c] * t.squaredNorm();
   }

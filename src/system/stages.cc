@@ -42,12 +42,12 @@ std::shared_ptr<const Eigen::MatrixXd> rig_prior(const calibration::CalibrationO
 // Returns true if a calibration that is due can be skipped. Images that contradict the calibration already do so in the
 // first estimates. If the first ones agree with it, every fourth one of the following is sufficient. A map that was
 // loaded, or whose scale had to be estimated, may have had no estimate yet.
-bool left_out(const calibration::CalibrationOptions& options, const map::BundledMap& map, const camera::Rig& given_rig,
-              KeyframeId first, KeyframeId keyframe) {
+// `number`: counted from 0.
+bool left_out(int number, const calibration::CalibrationOptions& options, const map::BundledMap& map,
+              const camera::Rig& given_rig, KeyframeId first) {
   if (options.refine == calibration::Refine::kTrue || calibration::replaced(map.rig(), given_rig)) return false;
   if (first.index() > 0 || map.scale_deviation() > 0) return false;
   constexpr int kFirst = 3, kEvery = 4;
-  const int number = execution::calibration_due(keyframe, map).value_or(0);
   return number >= kFirst && (number + 1) % kEvery != kFirst;
 }
 
@@ -66,8 +66,8 @@ calibration::CalibrationOptions options_of(int number, calibration::CalibrationO
 execution::StageResult calibrate(const Config& config, const camera::Rig& given_rig, KeyframeId first,
                                  const execution::StageTask& task, const map::MapSnapshot& base,
                                  const std::stop_token& stop) {
-  if (left_out(config.calibration, *base, given_rig, first, task.keyframe)) return {};
   const int number = execution::calibration_due(task.keyframe, *base).value_or(0);
+  if (left_out(number, config.calibration, *base, given_rig, first)) return {};
   const auto options = options_of(number, config.calibration);
   auto refinement = calibration::refine_if_accepted(*base, given_rig, options, config.feature_model(), stop, first);
   if (!refinement) return {};

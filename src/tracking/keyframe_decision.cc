@@ -267,8 +267,8 @@ std::vector<KeyframeEvidence> evidence_by_reference(const map::BundledMap& map, 
     } else {
       compare_features(map, reference, compared, inliers, T_rig_world, references, e);
     }
-    // Cameras that hardly see anything, such as dark ones, would ask for a keyframe in each of their images.
     e.without_newest = reference != map.nearest_alive_ancestor(newest_reference(references));
+    // Cameras that hardly see anything, such as dark ones, would ask for a keyframe in each of their images.
     const bool counts = e.best_overlap >= options.consensus.min_expected;
     if (out.empty() || counts || (e.without_newest && e.camera_with_few_inliers)) out.push_back(e);
   }

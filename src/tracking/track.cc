@@ -50,6 +50,7 @@ matching::ProjectionSearchOptions search_options(const TrackInput& input, const 
 void exclude(const TrackInput& input, const frame::BundledFrame& frame, const SE3& T_rig_world,
              const std::vector<std::uint8_t>& flagged, const ConsensusOptions& options, FrameMatches& found,
              std::vector<std::uint8_t>& excluded) {
+  if (!any(flagged)) return;
   const bool new_map = newly_started(input, frame);
   for (std::size_t c = 0; c < flagged.size(); ++c) {
     if (!flagged[c]) continue;
@@ -106,7 +107,8 @@ bool track_in_narrow_windows(const TrackInput& input, const std::vector<Landmark
   out.matches = keep_inliers(found, solution.inlier);
   out.reason = LostReason::kNone;
   out.reobserved = count_reobserved(map, frame, out.T_rig_world, input.state.cameras, out.matches);
-  const auto aligned = input.estimate ? input.estimate->aligned : std::vector<LandmarkCounts>();
+  const std::span<const LandmarkCounts> aligned =
+      input.estimate ? std::span(input.estimate->aligned) : std::span<const LandmarkCounts>();
   auto lost = cameras_losing_view(out.reobserved, aligned, input.state.cameras, options.consensus);
   for (std::size_t c = 0; c < lost.size(); ++c) lost[c] = lost[c] && !contradicting[c];  // has been judged
   exclude(input, frame, out.T_rig_world, lost, options.consensus, found, excluded);

@@ -47,7 +47,7 @@ bool rotated_view(const map::BundledMap& map, const frame::BundledFrame& frame, 
   std::vector<DirectionPair> pairs;
   for (const Match& m : matches)
     pairs.push_back({(T_cam_world * map.landmark(m.landmark).position).normalized(),
-                     frame.cameras[c].keypoints.bearing[m.keypoint.index()].normalized()});
+                     frame.cameras[c].keypoints.bearing[m.keypoint.index()]});
   const ViewRotation found = view_rotation(pairs);
   return found.angle <= geometry::radians(options.max_calibration_error_deg) &&
          found.agree >= options.healthy_reobservation_ratio * static_cast<double>(pairs.size());
