@@ -26,6 +26,44 @@ double cost(const solver::ReprojectionProblem& problem, const solver::RigValues&
   return solver::huber_cost(std::min(chi2, kMaxUsedChi2));
 }
 
+// What an image of a camera says about a move.
+struct PoseEvidence {
+  double before = 0;  // decrease of the cost if it was captured before the move, not after it
+  int observations = 0;
+};
+
+// Per pose of the problem. The cameras are those of the problem before and after the move.
+std::vector<PoseEvidence> evidence_of(const RigProblem& problem, const solver::RigValues& values,
+                                      std::size_t camera_before, std::size_t camera_after) {
+  const solver::ReprojectionProblem& bundle = problem.selected.problem;
+  std::vector<PoseEvidence> out(problem.selected.keyframes.size());
+  for (const Observation& o : bundle.observations) {
+    if (o.camera.index() != camera_before && o.camera.index() != camera_after) continue;
+    PoseEvidence& pose = out[static_cast<std::size_t>(o.pose)];
+    pose.before += cost(bundle, values, o, camera_after) - cost(bundle, values, o, camera_before);
+    ++pose.observations;
+  }
+  return out;
+}
+
+// The first of the poses, which are in the order of time, after the move. Returns nullopt if too few images are before
+// or after it: what looks like a move is then the error of these images.
+std::optional<std::size_t> best_place(std::span<const std::size_t> poses, std::span<const PoseEvidence> evidence) {
+  double sum = 0, most = 0;
+  int images = 0, images_before = 0;
+  std::optional<std::size_t> out;
+  for (std::size_t i = 0; i + 1 < poses.size(); ++i) {
+    sum += evidence[poses[i]].before;
+    images += evidence[poses[i]].observations > 0;
+    if (sum <= most) continue;
+    most = sum;
+    images_before = images;
+    out = poses[i + 1];
+  }
+  if (!poses.empty()) images += evidence[poses.back()].observations > 0;
+  return std::min(images_before, images - images_before) < kMinKeyframes ? std::nullopt : out;
+}
+
 }  // namespace
 
 MovedCameras::MovedCameras(std::size_t cameras, std::vector<camera::CameraMove> moves)
@@ -160,24 +198,14 @@ std::vector<PossibleMove> MovedCameras::likely_moves(const map::BundledMap& map,
 
 std::vector<camera::CameraMove> MovedCameras::at_best_times(const map::BundledMap& map, const RigProblem& problem,
                                                             const solver::RigValues& values) const {
-  std::vector<camera::CameraMove> out = moves_of(values);
   const std::vector<std::size_t> poses = poses_by_time(map, problem);
-  for (std::size_t m = 0; m < out.size(); ++m) {
-    const std::size_t camera_before = before(m), camera_after = cameras_ + m;
-    // Decrease of the cost if a pose was before the move, not after it.
-    std::vector<double> benefit(poses.size(), 0);
-    for (const Observation& o : problem.selected.problem.observations) {
-      if (o.camera.index() != camera_before && o.camera.index() != camera_after) continue;
-      benefit[static_cast<std::size_t>(o.pose)] += cost(problem.selected.problem, values, o, camera_after) -
-                                                   cost(problem.selected.problem, values, o, camera_before);
-    }
-    double sum = 0, most = 0;
-    for (std::size_t i = 0; i + 1 < poses.size(); ++i) {
-      sum += benefit[poses[i]];
-      if (sum <= most) continue;
-      most = sum;
-      out[m].time_ns = time_of(map, problem, poses[i + 1]);
-    }
+  std::vector<camera::CameraMove> out;
+  for (std::size_t m = 0; m < moves_.size(); ++m) {
+    const std::vector<PoseEvidence> evidence = evidence_of(problem, values, before(m), cameras_ + m);
+    const auto first_after = best_place(poses, evidence);
+    if (!first_after) continue;
+    out.push_back(moves_of(values)[m]);
+    out.back().time_ns = time_of(map, problem, *first_after);
   }
   std::ranges::stable_sort(out, {}, &camera::CameraMove::time_ns);
   return out;

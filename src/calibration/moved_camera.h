@@ -53,7 +53,8 @@ class MovedCameras {
   // Only moves at `from` or later count.
   std::vector<PossibleMove> likely_moves(const map::BundledMap& map, const RigProblem& problem,
                                          const solver::RigValues& values, TimeNs from) const;
-  // The moves that the values show, each before the keyframe for which its extrinsics before and after it fit best.
+  // The moves that the values show, each before the keyframe for which its extrinsics before and after it fit best;
+  // without those at the ends, of which too few images are on one side.
   std::vector<camera::CameraMove> at_best_times(const map::BundledMap& map, const RigProblem& problem,
                                                 const solver::RigValues& values) const;
   // The moves that the values show, and a further one, which begins without a change of the extrinsics.

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/median.h"
 #include "geometry/so3.h"
 #include "geometry/triangulation.h"
 
@@ -64,7 +65,18 @@ void advance(std::span<const PlaneMatch> matches, double scale, const Eigen::Vec
   estimate.focal_error += step(3);
 }
 
-// All members of the result except `agreed`.
+EpipolarPose corrected(const EpipolarPose& given, const Eigen::Matrix3d& correction) {
+  return {correction * given.R_b_a, correction * given.t_b_a};
+}
+
+void count(const EpipolarPose& given, std::span<const BearingPair> pairs, const PairRotationOptions& options,
+           PairRotation& out) {
+  const EpipolarAgreement found = epipolar_agreement(corrected(given, out.correction), pairs, options.tolerance);
+  out.agree = found.all;
+  out.with_depth = found.with_depth;
+}
+
+// All members of the result except `agreed` and `behind`.
 PairRotation solve(const EpipolarPose& given, std::span<const BearingPair> pairs, std::span<const PlaneMatch> matches,
                    const Eigen::Vector3d& fixed, const PairRotationOptions& options) {
   constexpr double kFirstScale = 0.07, kShrink = 0.7;  // rad, per step
@@ -75,11 +87,30 @@ PairRotation solve(const EpipolarPose& given, std::span<const BearingPair> pairs
   for (int i = 0; i < kLastSteps; ++i) advance(matches, options.tolerance, fixed, options, estimate);
   PairRotation out;
   out.correction = estimate.correction;
-  const EpipolarAgreement found =
-      epipolar_agreement({out.correction * given.R_b_a, out.correction * given.t_b_a}, pairs, options.tolerance);
-  out.agree = found.all;
-  out.with_depth = found.with_depth;
+  count(given, pairs, options, out);
   return out;
+}
+
+// The rotation about the disparity axis, on the left of `correction`, that brings to infinity the matches that are on
+// their epipolar planes but behind the cameras, i.e. beyond parallel; 0 if they are so few that they may be wrong
+// matches, or so many that the cameras may be exchanged. Twice their median is insensitive to wrong ones among them, as
+// the largest angle is not.
+double rotation_to_front(const EpipolarPose& pose, std::span<const BearingPair> pairs, const Eigen::Vector3d& axis,
+                         double tolerance) {
+  constexpr double kFew = 0.05, kMany = 0.85;  // fractions of the matches on their planes
+  std::size_t on_plane = 0;
+  std::vector<double> behind;  // angles from the parallel of a to b, rad, negative behind the cameras
+  for (const BearingPair& pair : pairs) {
+    const Eigen::Vector3d parallel = pose.R_b_a * pair.a;
+    if (geometry::angle_between(parallel, pair.b) >= tolerance && epipolar_angle(pose, pair) >= tolerance) continue;
+    const Eigen::Vector3d a = (parallel - axis.dot(parallel) * axis).stableNormalized();
+    const Eigen::Vector3d b = (pair.b - axis.dot(pair.b) * axis).stableNormalized();
+    const double angle = std::atan2(axis.dot(a.cross(b)), a.dot(b));
+    ++on_plane;
+    if (angle < -tolerance) behind.push_back(angle);
+  }
+  const double fraction = static_cast<double>(behind.size()) / static_cast<double>(std::max<std::size_t>(1, on_plane));
+  return fraction > kFew && fraction < kMany ? 2.0 * median(std::move(behind)) : 0.0;
 }
 
 }  // namespace
@@ -101,7 +132,14 @@ PairRotation pair_rotation(const EpipolarPose& given, std::span<const BearingPai
                            const PairRotationOptions& options) {
   constexpr double kClearly = 1.15;  // factor of the number of matches
   const std::vector<PlaneMatch> matches = plane_matches(given, pairs);
-  const PairRotation kept = solve(given, pairs, matches, disparity_axis(given, matches), options);
+  const Eigen::Vector3d axis = disparity_axis(given, matches);
+  PairRotation kept = solve(given, pairs, matches, axis, options);
+  const double angle = rotation_to_front(corrected(given, kept.correction), pairs, axis, options.tolerance);
+  if (angle != 0.0) {
+    kept.behind = true;
+    kept.correction = geometry::so3_exp(angle * axis).toRotationMatrix() * kept.correction;
+    count(given, pairs, options, kept);
+  }
   const PairRotation free = solve(given, pairs, matches, Eigen::Vector3d::Zero(), options);
   PairRotation out = free.agree > kClearly * kept.agree ? free : kept;
   out.agreed = epipolar_agreement(given, pairs, options.tolerance).all;

@@ -69,7 +69,7 @@ std::optional<geometry::SE3> agreeing_pose(const camera::Rig& rig, std::size_t i
   const bool second = of_j.agree >= of_i.agree;
   const estimators::PairRotation& found = second ? of_j : of_i;
   if (found.agree < kMinAgreeing * static_cast<double>(matches.size())) return std::nullopt;
-  if (found.agree < kClearly * found.agreed) return T_j_i;
+  if (found.agree < kClearly * found.agreed && !found.behind) return T_j_i;
   if (found.with_depth < kMinWithDepth || other_mistake(rig.camera(i), rig.camera(j), T_j_i, matches, tolerance))
     return std::nullopt;
   const geometry::SE3 correction(Eigen::Quaterniond(found.correction), Eigen::Vector3d::Zero());

@@ -179,6 +179,15 @@ TEST(MovedCamera, IsNotFoundInMapsOfConstantRigs) {
   EXPECT_TRUE(result.moves.empty());
 }
 
+// The first images of cameras that capture at different times are wrong, because the motion until then is not known.
+TEST(MovedCamera, IsNotFoundBecauseOfAFewImagesAtTheBeginningOrTheEnd) {
+  for (const int keyframe : {1, 2, kKeyframes - 1}) {
+    const RigRefinement result = refined(map_of(synthetic::default_rig(), {1, keyframe, turn({0, 0.5, 0.2})}));
+    ASSERT_TRUE(result.done);
+    EXPECT_TRUE(result.moves.empty()) << keyframe;
+  }
+}
+
 TEST(MovedCamera, OfARigOfTwoIsTheSecondOne) {
   const Moved moved{1, 15, turn({0.3, 0, 0})};
   const RigRefinement result = refined(map_of(synthetic::ring_rig(2), moved));

@@ -74,6 +74,31 @@ TEST(PairRotation, OneThatChangesDisparitiesIsFoundIfItIsLarge) {
   EXPECT_LT(geometry::so3_log(Eigen::Quaterniond(found.correction.transpose() * error)).norm(), 0.01);
 }
 
+// A camera turned outwards sees far points behind itself, which shows by how much it is turned.
+TEST(PairRotation, BringsPointsBehindTheCamerasToInfinity) {
+  Random random(7);
+  for (const double turn_deg : {0.5, 0.75, 1.0}) {
+    const Eigen::Matrix3d error =
+        geometry::so3_exp(Eigen::Vector3d::UnitY() * geometry::radians(turn_deg)).toRotationMatrix();
+    const EpipolarPose given{Eigen::Matrix3d::Identity(), -Eigen::Vector3d::UnitX()};
+    const auto pairs = matches_of({error, error * given.t_b_a}, 0.11, 10, random);
+    const PairRotation found = pair_rotation(given, pairs, {.tolerance = 1.5e-3});
+    const Eigen::Vector3d left =
+        geometry::so3_log(Eigen::Quaterniond(found.correction.transpose() * error)) / geometry::radians(1);
+    EXPECT_TRUE(found.behind);
+    EXPECT_LT(left.norm(), 0.35 * turn_deg + 0.1) << turn_deg;
+    EXPECT_GT(found.agree, 250);
+  }
+}
+
+TEST(PairRotation, DoesNotChangeDisparitiesIfNoPointIsBehindTheCameras) {
+  Random random(8);
+  const EpipolarPose given{Eigen::Matrix3d::Identity(), -Eigen::Vector3d::UnitX()};
+  const PairRotation found = pair_rotation(given, matches_of(given, 0.11, 5, random), {.tolerance = 2e-3});
+  EXPECT_FALSE(found.behind);
+  EXPECT_LT(geometry::so3_log(Eigen::Quaterniond(found.correction)).norm(), 1e-3);
+}
+
 // Exchanged cameras satisfy the epipolar geometry, but with points behind them.
 TEST(PairRotation, PointsBehindTheCamerasDoNotAgree) {
   Random random(4);
