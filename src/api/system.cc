@@ -200,7 +200,7 @@ MapView System::map() const { return impl_ ? api::make_map_view(impl_->system.sn
 Status System::save_map(const std::filesystem::path& file) const {
   if (!impl_) return moved_from("System::save_map");
   return api::guarded("System::save_map", [&]() -> Status {
-    if (const Status s = check_output_file(file.string(), "", true, "BSLAMMAP"); !s) return s;
+    if (const Status s = check_output_file(file.string(), "", true, storage::kMapFileBegin); !s) return s;
     return storage::write_map(*impl_->system.snapshot(), {impl_->vocabulary, BSLAM_VERSION, "live", impl_->map_warning},
                               file);
   });

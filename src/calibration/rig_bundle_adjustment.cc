@@ -269,7 +269,7 @@ double restore_scale(const solver::ExtrinsicPrior& prior, solver::ReprojectionPr
   for (geometry::SE3& T : state.T_rig_world) T = geometry::scaled(T, factor);
   for (geometry::Vector3d& point : state.points) point *= factor;
   for (geometry::SE3& T : problem.motion) T = geometry::scaled(T, factor);
-  for (geometry::Vector6d& twist : problem.twist) twist.tail<3>() *= factor;
+  for (geometry::Vector6d& twist : problem.twist) twist = geometry::scaled(twist, factor);
   return factor;
 }
 

@@ -110,7 +110,7 @@ Status check_out(const MergeArguments& arguments) {
   std::vector<std::filesystem::path> inputs(arguments.files.begin(), arguments.files.end());
   inputs.insert(inputs.end(), {arguments.vocabulary, arguments.config.file});
   if (Status other = check_not_input(arguments.out, "--out", inputs); !other) return other;
-  return check_output_file(arguments.out, "--out", arguments.overwrite, "BSLAMMAP");
+  return check_output_file(arguments.out, "--out", arguments.overwrite, storage::kMapFileBegin);
 }
 
 int map_merge(const MergeArguments& arguments) {

@@ -256,9 +256,10 @@ Status check_outputs(const SlamArguments& arguments, std::vector<OutputFile> fur
                                  {"--journal", arguments.journal},
                                  {"--rerun", writes_rerun ? arguments.rerun : ""}});
   if (const Status s = check_names(std::move(further), arguments.out); !s) return s;
-  for (const auto& [option, file, begin] : {std::tuple("--save-map", arguments.save_map, "BSLAMMAP"),
-                                            std::tuple("--journal", arguments.journal, "bslam-journal"),
-                                            std::tuple("--rerun", writes_rerun ? arguments.rerun : "", "RRF")}) {
+  for (const auto& [option, file, begin] :
+       {std::tuple("--save-map", arguments.save_map, storage::kMapFileBegin),
+        std::tuple("--journal", arguments.journal, std::string_view("bslam-journal")),
+        std::tuple("--rerun", writes_rerun ? arguments.rerun : "", std::string_view("RRF"))}) {
     if (const Status s = check_output_file(file, option, arguments.overwrite, begin); !s) return s;
   }
   return arguments.rerun.empty() ? Status() : check_rerun(arguments.rerun);

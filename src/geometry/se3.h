@@ -36,6 +36,12 @@ class SE3 {
 
 // Returns T with its translation multiplied by `factor`.
 inline SE3 scaled(const SE3& T, double factor) { return {T.rotation(), factor * T.translation()}; }
+// The same for a tangent vector, such as a twist: multiplies its translational part.
+inline Vector6d scaled(const Vector6d& xi, double factor) {
+  Vector6d out = xi;
+  out.tail<3>() *= factor;
+  return out;
+}
 
 // Returns the pose on the geodesic from `a` (fraction 0) to `b` (fraction 1). Fractions outside [0, 1] extrapolate.
 SE3 interpolate(const SE3& a, const SE3& b, double fraction);

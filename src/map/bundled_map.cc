@@ -299,7 +299,7 @@ bool BundledMap::scale_submap(KeyframeId root, double factor) {
     entry.scale *= factor;
     geometry::SE3& T = entry.alive ? entry.T_rig_world : entry.T_rig_parent;
     T = geometry::scaled(T, factor);
-    entry.twist.tail<3>() *= factor;
+    entry.twist = geometry::scaled(entry.twist, factor);
     entry.uncertainty = geometry::scaled(std::move(entry.uncertainty), factor);
   }
   for (std::size_t i = 0; i < landmarks_.size(); ++i) {
@@ -321,7 +321,7 @@ void BundledMap::scale_keyframes(std::span<const std::pair<KeyframeId, double>> 
     if (!now.valid() || factor_of[now.index()] == 1.0) continue;
     BundledKeyframe& entry = edit(KeyframeId(i));
     entry.scale *= factor_of[now.index()];
-    entry.twist.tail<3>() *= factor_of[now.index()];
+    entry.twist = geometry::scaled(entry.twist, factor_of[now.index()]);
     entry.uncertainty = geometry::scaled(std::move(entry.uncertainty), factor_of[now.index()]);
     if (!entry.alive) entry.T_rig_parent = geometry::scaled(entry.T_rig_parent, factor_of[now.index()]);
   }

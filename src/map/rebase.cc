@@ -34,12 +34,6 @@ Motion motion_between(const SE3& before, const SE3& after, double scale_change =
   return Move{before, after, scale_change};
 }
 
-geometry::Vector6d apply_scale_change(const geometry::Vector6d& twist, double scale_change) {
-  geometry::Vector6d out = twist;
-  out.tail<3>() *= scale_change;
-  return out;
-}
-
 class Rebase {
  public:
   Rebase(const MapEdit& edit, BundledMap& map)
@@ -132,7 +126,7 @@ bool Rebase::operator()(const AddKeyframe& op) {
   if (frame::changes_frames(base_.rig(), map_.rig()))
     frame = std::make_shared<const frame::BundledFrame>(frame::recalibrated(*frame, base_.rig(), map_.rig()));
   const KeyframeId added = map_.add_keyframe(std::move(frame), T_rig_world, usable_matches(map_, matches), parent);
-  if (motion) map_.set_twist(added, apply_scale_change(op.frame->twist, motion->scale_change));
+  if (motion) map_.set_twist(added, geometry::scaled(op.frame->twist, motion->scale_change));
   report_.keyframes.push_back(added);
   own_motions_.push_back(motion);
   return true;
@@ -232,7 +226,7 @@ bool Rebase::operator()(const SetTwists& op) {
   bool any = false;
   for (const auto& [edit_id, twist] : op.keyframes) {
     const Motion motion = motion_since_base(edit_id);
-    any |= map_.set_twist(map_id(edit_id), apply_scale_change(twist, motion ? motion->scale_change : 1.0));
+    any |= map_.set_twist(map_id(edit_id), geometry::scaled(twist, motion ? motion->scale_change : 1.0));
   }
   return any;
 }

@@ -28,7 +28,7 @@ std::vector<CameraPair> overlapping_pairs(const camera::Rig& rig) {
   std::vector<CameraPair> pairs;
   for (std::size_t i = 0; i < rig.size(); ++i) {
     for (std::size_t j = i + 1; j < rig.size(); ++j) {
-      if (rig.overlap(i, j) || rig.overlap(j, i)) pairs.push_back({CameraIndex(i), CameraIndex(j)});
+      if (rig.share_view(i, j)) pairs.push_back({CameraIndex(i), CameraIndex(j)});
     }
   }
   return pairs;

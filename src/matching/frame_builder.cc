@@ -9,7 +9,8 @@
 namespace bslam::matching {
 
 FrameBuilder::FrameBuilder(std::size_t cameras, const feature::FeatureOptions& options, std::vector<image::Image> masks)
-    : shape_(options.model().pyramid),
+    : options_(options),
+      shape_(options.model().pyramid),
       masks_(std::move(masks)),
       combined_masks_(cameras),
       pyramids_(cameras),
@@ -79,6 +80,11 @@ void FrameBuilder::adopt(ReleasedImages images) {
 void FrameBuilder::clear() {
   pyramids_.assign(pyramids_.size(), {});
   std::ranges::fill(current_masks_, image::ImageView());
+}
+
+void FrameBuilder::free_memory() {
+  clear();
+  for (feature::Extractor& extractor : extractors_) extractor = feature::Extractor(options_);
 }
 
 image::ImageView FrameBuilder::mask_of(std::size_t camera, const image::CameraImage& image) {

@@ -47,6 +47,8 @@ class FrameBuilder {
   void adopt(ReleasedImages images);
   // Discards the images.
   void clear();
+  // Discards the images and the scratch memory of the extractors, which the next frame allocates again.
+  void free_memory();
 
   // Memory of the pyramids and masks that it holds, in bytes.
   std::size_t memory_bytes() const;
@@ -54,6 +56,7 @@ class FrameBuilder {
  private:
   image::ImageView mask_of(std::size_t camera, const image::CameraImage& image);
 
+  feature::FeatureOptions options_;
   feature::PyramidShape shape_;
   std::vector<feature::Extractor> extractors_;
   std::vector<image::Image> masks_;

@@ -20,7 +20,6 @@
 namespace bslam::storage {
 namespace {
 
-constexpr std::string_view kMagic = "BSLAMMAP";
 constexpr std::uint32_t kOrderMark = 0x01020304, kVersion = 6, kOldestVersion = 2;
 constexpr std::array<std::string_view, 4> kTags = {"RIG ", "INFO", "KEYF", "LAND"};
 constexpr std::array<const char*, 4> kNames = {"rig", "info", "keyframes", "landmarks"};
@@ -48,7 +47,7 @@ std::string header_of(std::span<const std::string, kTags.size()> sections, Threa
   std::size_t total = kHeaderBytes;
   for (const std::string& s : sections) total += s.size();
   ByteWriter out;
-  out.numbers(kMagic.data(), kMagic.size());
+  out.numbers(kMapFileBegin.data(), kMapFileBegin.size());
   out.number(kOrderMark);
   out.number(kVersion);
   out.number(static_cast<std::uint32_t>(kTags.size()));
@@ -70,10 +69,10 @@ Error damaged(std::string_view section, std::string found, std::string expected)
 
 // Returns the sections of a complete file after verifying their checksums. Error.file is left empty.
 Result<Sections> take_apart(std::string_view bytes, ThreadPool& pool) {
-  if (!bytes.starts_with(kMagic))
-    return damaged("", "a file of another format", fmt::format("a saved map, which begins with {}", kMagic));
+  if (!bytes.starts_with(kMapFileBegin))
+    return damaged("", "a file of another format", fmt::format("a saved map, which begins with {}", kMapFileBegin));
   if (bytes.size() < kHeaderBytes) return damaged("header", fmt::format("{} bytes", bytes.size()), "a complete header");
-  SectionReader in(bytes.substr(kMagic.size(), kHeaderBytes - kMagic.size()), "header");
+  SectionReader in(bytes.substr(kMapFileBegin.size(), kHeaderBytes - kMapFileBegin.size()), "header");
   if (in.number<std::uint32_t>() != kOrderMark) return damaged("header", "another byte order", "little endian");
   const auto version = in.number<std::uint32_t>();
   if (version < kOldestVersion || version > kVersion) {

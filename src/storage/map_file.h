@@ -14,6 +14,8 @@
 
 namespace bslam::storage {
 
+inline constexpr std::string_view kMapFileBegin = "BSLAMMAP";  // the first bytes of a map file
+
 // Metadata of a saved map.
 struct MapFileInfo {
   std::uint64_t vocabulary = 0;  // Vocabulary::id() of the visual words of its keyframes; 0 if they have none

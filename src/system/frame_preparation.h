@@ -36,6 +36,8 @@ class FramePreparation {
   // The images of the frame that was begun last. release() moves them out.
   tracking::FrameImages images() const { return {builder_.pyramids(), builder_.masks()}; }
   matching::ReleasedImages release() { return builder_.release(); }
+  // See matching::FrameBuilder.
+  void free_memory() { builder_.free_memory(); }
   std::size_t memory_bytes() const { return builder_.memory_bytes(); }
 
  private:

@@ -33,7 +33,7 @@ execution::StageResult KeyframeMaker::make(FrameId id, const map::MapSnapshot& b
   const camera::Rig& rig = base->rig();
   if (frame::changes_frames(*deferred.rig, rig)) frame = frame::recalibrated(std::move(frame), *deferred.rig, rig);
   const map::AnchoredPose& pose = deferred.request.pose;
-  if (pose.known_in(*base)) frame.twist.tail<3>() *= pose.scale_change(*base);
+  if (pose.known_in(*base)) frame.twist = geometry::scaled(frame.twist, pose.scale_change(*base));
   builder_.adopt(std::move(deferred.images));
   builder_.extract(rig, frame, pool_, deferred.budgets);
   frame = matching::bundle(frame::rig_of(rig, frame), frame, builder_.pyramids(), config_.bundling, deferred.alignment,

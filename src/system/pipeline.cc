@@ -83,7 +83,8 @@ tracking::TrackOutcome Pipeline::track(const image::ImageBundle& images, const t
   bool directly = tracker_.tracks_directly(state_);
   if (!directly) add_features();
   outcome.seen = executor.begin_frame(frame.id);
-  frame.twist.tail<3>() *= state_.track.anchored.scale_change(*outcome.seen);  // planned at the scale of the state
+  // It was planned at the scale of the state.
+  frame.twist = geometry::scaled(frame.twist, state_.track.anchored.scale_change(*outcome.seen));
   const bool recalibrated = preparation_.adopt_rig(*outcome.seen, frame);
   if (recalibrated) tracker_.restart_monocular_start(state_);
   const auto created = adopt_keyframe(outcome);

@@ -56,6 +56,9 @@ class Pipeline {
   void set_reduction(int level);
   int reduction() const { return state_.reduction; }
 
+  // Frees the images of the last frame and scratch memory for the following ones.
+  void free_memory() { preparation_.free_memory(); }
+
   const tracking::Tracker& tracker() const { return tracker_; }
 
   // Memory of the image pyramids of the last frame, and of the relocaliser's index of keyframes, in bytes.

@@ -157,6 +157,8 @@ void System::bound_history() {
 
 void System::finish() {
   executor_->drain();
+  pipeline_.free_memory();
+  keyframe_maker_.free_memory();
   mark_created_keyframes();
   if (config_.final_adjustment && !config_.localize_only && !executor_->over()) {
     const Stopwatch watch;

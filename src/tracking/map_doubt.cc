@@ -24,7 +24,7 @@ bool disowns_map(const TrackResult& result) {
 
 bool overlaps_any(const camera::Rig& rig, std::size_t camera) {
   for (std::size_t other = 0; other < rig.size(); ++other) {
-    if (rig.overlap(camera, other) || rig.overlap(other, camera)) return true;
+    if (rig.share_view(camera, other)) return true;
   }
   return false;
 }

@@ -2,19 +2,18 @@
 
 #include <algorithm>
 #include <array>
+#include <iterator>
+
+#include "map/keyframe_landmarks.h"
 
 namespace bslam::tracking {
 namespace {
 
 using geometry::SE3;
 
-std::vector<LandmarkId> landmarks_of_both(const map::BundledMap& map, KeyframeId a, KeyframeId b) {
+std::vector<LandmarkId> landmarks_of_either(const map::BundledMap& map, KeyframeId a, KeyframeId b) {
   std::vector<LandmarkId> out;
-  for (const KeyframeId k : {a, b}) {
-    std::ranges::copy_if(map.keyframe(k).landmarks, std::back_inserter(out), [](LandmarkId l) { return l.valid(); });
-  }
-  std::sort(out.begin(), out.end());
-  out.erase(std::unique(out.begin(), out.end()), out.end());
+  std::ranges::set_union(map::landmarks_of(map, a), map::landmarks_of(map, b), std::back_inserter(out));
   return out;
 }
 
@@ -49,7 +48,7 @@ std::optional<TrackResult> pose_between(const map::BundledMap& map, const Betwee
   frame.twist = (T_after * T_before.inverse()).log() / between_s;
   const camera::Rig rig = frame::rig_of(map.rig(), frame);
   SE3 T = geometry::interpolate(T_before, T_after, fraction);
-  const std::vector<LandmarkId> landmarks = landmarks_of_both(map, before, after);
+  const std::vector<LandmarkId> landmarks = landmarks_of_either(map, before, after);
   // The first search uses the interpolated pose, the second one the pose found by the first.
   solver::PoseSolution solution;
   FrameMatches found;

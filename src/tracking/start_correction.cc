@@ -95,7 +95,7 @@ std::optional<camera::Rig> with_corrected_rotations(const camera::Rig& rig, cons
   bool any = false;
   for (std::size_t j = 1; j < rig.size(); ++j) {
     for (std::size_t i = 0; i < j; ++i) {
-      if (!rig.overlap(i, j) && !rig.overlap(j, i)) continue;
+      if (!rig.share_view(i, j)) continue;
       const geometry::SE3 T_j_i = rig.cam_from_rig(j) * rig.rig_from_cam(i);
       const auto agreeing = agreeing_pose(rig, i, j, T_j_i, frame);
       if (!agreeing) continue;

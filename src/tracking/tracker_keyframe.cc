@@ -39,7 +39,7 @@ void Tracker::complete_keyframe(const map::CommitReport& report, TrackOutcome& o
   TrackerState& state = outcome.next.track;
   TrackResult& result = outcome.record.result;
   // Mapping may have committed a new scale while the frame was tracked. The record keeps that of its pose.
-  if (state.twist) state.twist->tail<3>() *= result.anchored.scale_change(*report.published);
+  if (state.twist) state.twist = geometry::scaled(*state.twist, result.anchored.scale_change(*report.published));
   state = state_at_keyframe(state, result.time_ns, *report.published, report.keyframes.front(),
                             committed_landmarks(outcome.edit->landmarks, outcome.edit->base_landmarks, report));
   result.anchored = state.anchored;

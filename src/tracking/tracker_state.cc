@@ -32,7 +32,7 @@ std::vector<std::uint8_t> excluded(const TrackerState& state, std::size_t camera
 }
 
 void apply_scale_change(const map::BundledMap& map, TrackerState& state) {
-  if (state.twist) state.twist->tail<3>() *= state.anchored.scale_change(map);
+  if (state.twist) state.twist = geometry::scaled(*state.twist, state.anchored.scale_change(map));
   state.anchored.rescale(map);
 }
 
