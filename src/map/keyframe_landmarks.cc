@@ -13,4 +13,13 @@ std::vector<LandmarkId> landmarks_of(const BundledMap& map, KeyframeId k) {
   return out;
 }
 
+std::vector<int> landmarks_by_camera(const BundledKeyframe& keyframe) {
+  std::vector<int> seen(keyframe.frame->cameras.size(), 0);
+  for (std::size_t f = 0; f < keyframe.landmarks.size(); ++f) {
+    if (!keyframe.landmarks[f].valid()) continue;
+    for (const frame::KeypointRef r : keyframe.frame->bundled.keypoints(FeatureId(f))) ++seen[r.camera.index()];
+  }
+  return seen;
+}
+
 }  // namespace bslam::map

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "map/keyframe_landmarks.h"
+
 namespace bslam::tracking {
 namespace {
 
@@ -71,9 +73,25 @@ bool MapDoubt::is_new(TimeNs time_ns, const map::BundledMap& seen, std::size_t m
          seen.keyframe_slots() - first_keyframe_ <= max_keyframes;
 }
 
-// Returns true if a recent monocular initialisation was wrong: the frames after it are lost.
+// Returns true if a recent monocular initialisation was wrong: the frames after it are lost, although they have images
+// of cameras that observe the map.
 bool MapDoubt::disowned(const TrackResult& result, const map::BundledMap& seen) const {
-  return seen.scale() != map::Scale::kMetric && disowns_map(result) && is_new(result.time_ns, seen, kMaxFailedMap);
+  return seen.scale() != map::Scale::kMetric && disowns_map(result) && is_new(result.time_ns, seen, kMaxFailedMap) &&
+         observed_by_cameras_of(result, seen);
+}
+
+// Returns true if a camera with keypoints in this frame observes several landmarks in some keyframe of the new map.
+// Without their images a frame is lost in every map.
+bool MapDoubt::observed_by_cameras_of(const TrackResult& result, const map::BundledMap& seen) const {
+  constexpr int kMinLandmarks = 30;
+  for (std::size_t k = first_keyframe_; k < seen.keyframe_slots(); ++k) {
+    if (!seen.alive(KeyframeId(k))) continue;
+    const std::vector<int> landmarks = map::landmarks_by_camera(seen.keyframe(KeyframeId(k)));
+    for (std::size_t c = 0; c < landmarks.size() && c < result.cameras.size(); ++c) {
+      if (landmarks[c] >= kMinLandmarks && result.cameras[c].keypoints > 0) return true;
+    }
+  }
+  return false;
 }
 
 // Returns true if a recent initialisation was wrong, because most of its points were on a moving object: the cameras

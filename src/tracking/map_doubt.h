@@ -35,6 +35,7 @@ class MapDoubt {
  private:
   bool is_new(TimeNs time_ns, const map::BundledMap& seen, std::size_t max_keyframes) const;
   bool disowned(const TrackResult& result, const map::BundledMap& seen) const;
+  bool observed_by_cameras_of(const TrackResult& result, const map::BundledMap& seen) const;
   bool contradicted(const TrackResult& result, const map::BundledMap& seen, bool undecided) const;
   bool scale_contradicted(const TrackResult& result) const;
 

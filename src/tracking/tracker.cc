@@ -270,8 +270,7 @@ void Tracker::track(Input& input, TrackOutcome& outcome) {
       calibration_errors(state.calibration_errors, *input.map, input.frame, output, options_.tracking.alignment);
   if (!is_tracking(output.result.status)) return handle_lost(input, before, outcome);
   state.frames_lost = state.direct_kept = 0;
-  state.start_reference.reset();
-  state.waiting.clear();
+  restart_monocular_start(state);
   state.track = std::move(output.state);
   update_odometry(*input.map, before, outcome);
   if (options_.localize_only) {

@@ -56,6 +56,13 @@ struct PendingKeyframe {
   int frames = 0;                  // number of frames since the request
 };
 
+// A reference frame of a monocular initialisation. If not every frame has images of the same cameras, there are
+// several: each has an image of a camera that the earlier ones do not have.
+struct StartReference {
+  std::shared_ptr<const StartCandidate> candidate;
+  int frames_of_others = 0;  // consecutive frames without an image of any of its cameras
+};
+
 // State of the front end that is carried from frame to frame.
 struct FrontEndState {
   TrackerState track;
@@ -64,13 +71,12 @@ struct FrontEndState {
   std::vector<TimeNs> unused_ns;           // per camera, time since its last used image during which others were used
   std::vector<double> budget_fractions;    // per camera, fraction of the feature budget; empty: equal fractions
   std::vector<double> calibration_errors;  // per camera, px; empty: not estimated
-  // During a monocular initialisation: the reference frame, and all frames since, beginning with the reference.
-  std::shared_ptr<const StartCandidate> start_reference;
+  // During a monocular initialisation: the reference frames, oldest first, and all frames since the oldest.
+  std::vector<StartReference> start_references;
   std::vector<std::shared_ptr<const frame::BundledFrame>> waiting;
-  int frames_of_others = 0;  // consecutive frames without an image of any camera of the reference frame
-  int direct_failures = 0;   // consecutive attempts of direct tracking that found no pose
-  int direct_pause = 0;      // number of frames until the next attempt
-  int direct_kept = 0;       // number of poses from direct tracking that were kept since features last gave a pose
+  int direct_failures = 0;  // consecutive attempts of direct tracking that found no pose
+  int direct_pause = 0;     // number of frames until the next attempt
+  int direct_kept = 0;      // number of poses from direct tracking that were kept since features last gave a pose
   std::optional<PendingKeyframe> pending;
   // The last pending keyframe was not created. The next keyframe must come from a frame with features.
   bool keyframe_failed = false;

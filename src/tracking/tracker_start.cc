@@ -1,5 +1,6 @@
 // Initialisation of a map by the tracker, if there is no map or the rig cannot be located in it.
 #include "base/stopwatch.h"
+#include "map/keyframe_landmarks.h"
 #include "tracking/start_correction.h"
 #include "tracking/tracker.h"
 
@@ -13,16 +14,6 @@ constexpr int kMetricAttempts = 5;  // frames in which only metric initialisatio
 constexpr int kMaxStartAge = 100;  // frames
 constexpr double kMaxStartAge_s = 10;
 constexpr std::size_t kMaxWaiting = 100;  // frames since the reference frame; of the later ones, every tenth is kept
-
-// Number of landmarks of a keyframe observed by each camera.
-std::vector<int> landmarks_by_camera(const map::BundledKeyframe& keyframe) {
-  std::vector<int> seen(keyframe.frame->cameras.size(), 0);
-  for (std::size_t f = 0; f < keyframe.landmarks.size(); ++f) {
-    if (!keyframe.landmarks[f].valid()) continue;
-    for (const frame::KeypointRef r : keyframe.frame->bundled.keypoints(FeatureId(f))) ++seen[r.camera.index()];
-  }
-  return seen;
-}
 
 TrackResult not_started(const BundledFrame& frame) {
   TrackResult result;
@@ -38,6 +29,17 @@ TrackResult not_started(const BundledFrame& frame) {
 bool too_old(const BundledFrame& reference, const BundledFrame& frame) {
   return frame.id.value() - reference.id.value() > kMaxStartAge &&
          to_seconds(frame.time_ns - reference.time_ns) > kMaxStartAge_s;
+}
+
+// Returns true if the frame has keypoints of a camera of which no reference frame has.
+bool has_other_cameras(const BundledFrame& frame, std::span<const StartReference> references) {
+  for (std::size_t c = 0; c < frame.cameras.size(); ++c) {
+    const auto has_keypoints = [c](const StartReference& r) {
+      return !r.candidate->frame->cameras[c].keypoints.empty();
+    };
+    if (!frame.cameras[c].keypoints.empty() && std::ranges::none_of(references, has_keypoints)) return true;
+  }
+  return false;
 }
 
 // Returns true if both frames have keypoints, but no camera has keypoints in both of them.
@@ -90,10 +92,13 @@ std::optional<StartedMap> Tracker::initialise(const Input& input, const FrontEnd
   const bool single = std::ranges::count(gone, std::uint8_t{0}) <= 1;
   if (metric && (overlap || single)) return std::nullopt;
   const int metric_attempts = overlap ? kMetricAttempts : 0;
-  if (!state.start_reference || input.frame.id.value() - state.start_reference->frame->id.value() < metric_attempts)
-    return std::nullopt;
   const Random random(options_.seed, "start", static_cast<std::uint64_t>(input.frame.id.value()));
-  return initialise_monocular(*state.start_reference, input.frame, input.pyramids, options, random, draft);
+  for (const StartReference& reference : state.start_references) {
+    const StartCandidate& first = *reference.candidate;
+    if (input.frame.id.value() - state.start_references.front().candidate->frame->id.value() < metric_attempts) break;
+    if (auto started = initialise_monocular(first, input.frame, input.pyramids, options, random, draft)) return started;
+  }
+  return std::nullopt;
 }
 
 // Per camera of the rig: whether it belongs to another rig of the map, or has not been used for long.
@@ -124,29 +129,32 @@ bool Tracker::correct_rig(const Input& input, TrackOutcome& outcome) const {
 }
 
 void Tracker::restart_monocular_start(FrontEndState& state) {
-  state.start_reference.reset();
+  state.start_references.clear();
   state.waiting.clear();
 }
 
-// Stores the frame. The frame becomes the new reference frame if the present one is too old or has too few matches with
-// it. A frame of other cameras cannot be matched with the reference frame and does not replace it, unless there is no
-// other kind any more.
+// Stores the frame. Reference frames that are too old or have too few matches with it are removed. A frame of other
+// cameras cannot be matched with a reference frame and does not remove it, unless there is no other kind any more. The
+// frame becomes a reference frame if it has keypoints of a camera of which no other one has.
 void Tracker::keep_reference_frame(Input& input, FrontEndState& state) const {
   const InitialisationOptions& options = options_.tracking.initialisation;
-  if (state.start_reference && input.frame.num_keypoints() < static_cast<std::size_t>(options.min_monocular))
+  std::vector<StartReference>& references = state.start_references;
+  if (!references.empty() && input.frame.num_keypoints() < static_cast<std::size_t>(options.min_monocular))
     return;  // too few keypoints to compare
-  const bool others = state.start_reference && from_other_cameras(*state.start_reference->frame, input.frame);
-  state.frames_of_others = others ? state.frames_of_others + 1 : 0;
-  const bool good = state.start_reference && !too_old(*state.start_reference->frame, input.frame) &&
-                    (others ? state.frames_of_others < static_cast<int>(rig_.size())
-                            : comparable(*state.start_reference->frame, input.frame, options));
+  std::erase_if(references, [&](StartReference& reference) {
+    const BundledFrame& first = *reference.candidate->frame;
+    const bool others = from_other_cameras(first, input.frame);
+    reference.frames_of_others = others ? reference.frames_of_others + 1 : 0;
+    if (others) return reference.frames_of_others >= static_cast<int>(rig_.size());
+    return too_old(first, input.frame) || !comparable(first, input.frame, options);
+  });
   const auto kept = std::make_shared<const BundledFrame>(std::move(input.frame));
-  if (!good) {
-    state.start_reference =
-        std::make_shared<const StartCandidate>(StartCandidate{kept, {input.pyramids.begin(), input.pyramids.end()}});
-    state.waiting.clear();
-    state.frames_of_others = 0;
+  if (references.empty() || has_other_cameras(*kept, references)) {
+    const StartCandidate candidate{kept, {input.pyramids.begin(), input.pyramids.end()}};
+    references.push_back({std::make_shared<const StartCandidate>(candidate)});
   }
+  const FrameId oldest = references.front().candidate->frame->id;
+  std::erase_if(state.waiting, [&](const auto& frame) { return frame->id < oldest; });
   if (state.waiting.size() < kMaxWaiting || kept->id.value() % 10 == 0) state.waiting.push_back(kept);
 }
 
@@ -158,17 +166,19 @@ void Tracker::complete_start(const map::CommitReport& report, TrackOutcome& outc
   state.track = state_at_keyframe({}, result.time_ns, *report.published, last,
                                   committed_landmarks(outcome.edit->landmarks, outcome.edit->base_landmarks, report));
   state.track.cameras = readmit_observing_cameras(std::vector<CameraConsensusState>(rig_.size()),
-                                                  landmarks_by_camera(keyframe), options_.tracking.consensus);
+                                                  map::landmarks_by_camera(keyframe), options_.tracking.consensus);
   result.status = TrackStatus::kTracking;
   result.reason = LostReason::kNone;
   result.T_rig_world = keyframe.T_rig_world;
   result.anchored = state.track.anchored;
   outcome.record.root = report.published->root_of(last);
   if (report.keyframes.size() == 2) {
-    const TimeNs first_ns = state.start_reference->frame->time_ns;
-    for (auto& early : state.waiting)
-      outcome.early.push_back({std::move(early), report.keyframes[0], report.keyframes[1], first_ns, result.time_ns,
-                               report.published->shared_rig()});
+    const BundledFrame& first = *report.published->keyframe(report.keyframes[0]).frame;
+    for (auto& early : state.waiting) {
+      if (early->id >= first.id)
+        outcome.early.push_back({std::move(early), report.keyframes[0], report.keyframes[1], first.time_ns,
+                                 result.time_ns, report.published->shared_rig()});
+    }
   }
   restart_monocular_start(state);
   state.frames_lost = 0;

@@ -107,6 +107,17 @@ TEST(MapDoubt, AMapThatIsMetricOrOldOrLargeIsRightIfTrackingIsLost) {
   EXPECT_FALSE(large.update(DoubtfulRun::lost(1.1)));
 }
 
+// If each camera loses some of its images, a frame may have none of those that observe the map.
+TEST(MapDoubt, ANewMapIsNotWrongIfNoCameraThatObservesItHasAnImage) {
+  DoubtfulRun run(map::Scale::kUpToScale);
+  run.start(1.0);
+  FrameRecord record = DoubtfulRun::lost(1.1);
+  for (CameraCounts& camera : record.result.cameras) camera.keypoints = 0;
+  EXPECT_FALSE(run.update(record));
+  record.result.cameras[1].keypoints = 1000;
+  EXPECT_TRUE(run.update(record));
+}
+
 // Keyframes of maps that were discarded before do not count.
 TEST(MapDoubt, IsForgottenWithTheMap) {
   DoubtfulRun run(map::Scale::kUpToScale, 4);

@@ -101,21 +101,25 @@ camera::Rig rig_without_overlap() {
   return camera::Rig(std::move(cameras));
 }
 
-// The reference frame of a monocular start after some frames, each with an image of the given camera only.
-FrameId start_reference(const std::vector<int>& cameras) {
+// The reference frames of a monocular start after some frames, each with an image of the given camera only.
+std::vector<FrameId> start_references(const std::vector<int>& cameras) {
   TrackerRun run(rig_without_overlap());
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     std::vector<int> missing = {0, 1, 2};
     std::erase(missing, cameras[i]);
     run.process(run.sim.frame(FrameId(i), 0.01 * static_cast<double>(i), missing).frame);
   }
-  return run.state.start_reference->frame->id;
+  std::vector<FrameId> out;
+  for (const StartReference& reference : run.state.start_references) out.push_back(reference.candidate->frame->id);
+  return out;
 }
 
 TEST(Tracker, AStartWaitsForTheCamerasOfItsFirstFrameForOneRoundOnly) {
-  EXPECT_EQ(start_reference({0, 1, 2, 0, 1, 2, 0}), FrameId(0));  // one camera after the other
-  EXPECT_EQ(start_reference({1, 0, 0}), FrameId(0));
-  EXPECT_EQ(start_reference({1, 0, 0, 0}), FrameId(3));  // there are no images of camera 1 any more
+  using Frames = std::vector<FrameId>;
+  EXPECT_EQ(start_references({0, 1, 2, 0, 1, 2, 0}), Frames({FrameId(0), FrameId(1), FrameId(2)}))
+      << "one after the other";
+  EXPECT_EQ(start_references({1, 0, 0}), Frames({FrameId(0), FrameId(1)}));
+  EXPECT_EQ(start_references({1, 0, 0, 0}), Frames({FrameId(1)})) << "there are no images of camera 1 any more";
 }
 
 TEST(Tracker, DirectTrackingPausesAfterFailures) {
