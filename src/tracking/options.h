@@ -74,9 +74,7 @@ struct KeyframeOptions {
 };
 
 struct InitialisationOptions {
-  // Minimum number of features with an accurate metric point for a metric map: twice TrackingOptions::min_inliers,
-  // since the next frame may show few of them.
-  int min_matched = 60;
+  int min_matched = 30;           // minimum number of features with an accurate metric point for a metric map
   double max_depth_error = 0.15;  // maximum relative standard deviation of the depth of a new landmark
   double min_parallax = 5e-4;     // rad, minimum parallax of a matched feature for which a point is triangulated
   double max_chi2 = 7.81;         // maximum squared normalised error of a keypoint to its feature's point

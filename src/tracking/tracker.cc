@@ -100,6 +100,7 @@ FrontEndState FrontEndState::restarted() const {
   state.blurred = blurred;
   state.planned_ns = planned_ns;
   state.unused_ns = unused_ns;
+  state.incomplete_ns = incomplete_ns;
   state.reduction = reduction;
   state.rig_corrections = rig_corrections;
   state.T_rig_odom = T_rig_odom;
@@ -126,6 +127,10 @@ FramePlan Tracker::plan(const image::ImageBundle& images, const ImageFaults& fau
   std::vector<std::uint8_t> out(rig_.size());
   for (std::size_t c = 0; c < out.size(); ++c) out[c] = faults.outage[c] != CameraReason::kNone;
   count_unused(images.time_ns, out, state);
+  const std::vector<std::uint8_t> gone = gone_cameras(state);
+  for (std::size_t c = 0; c < out.size(); ++c) {
+    if (out[c] && !gone[c]) state.incomplete_ns = images.time_ns;
+  }
   const bool recent = to_seconds(images.time_ns - state.track.time_ns) <= kMaxPrediction_s;
   const bool motion_known = state.track.twist && recent;
   const bool motion_matters = options_.tracking.use_capture_times && !motion_known;

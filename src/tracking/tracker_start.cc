@@ -13,6 +13,7 @@ constexpr int kMetricAttempts = 5;  // frames in which only metric initialisatio
 // Maximum age of the reference frame of a monocular initialisation, if both are exceeded.
 constexpr int kMaxStartAge = 100;  // frames
 constexpr double kMaxStartAge_s = 10;
+constexpr double kGone_s = 2.0;           // a camera without images for longer is not in use any more
 constexpr std::size_t kMaxWaiting = 100;  // frames since the reference frame; of the later ones, every tenth is kept
 
 TrackResult not_started(const BundledFrame& frame) {
@@ -80,7 +81,10 @@ void Tracker::start(Input& input, TrackOutcome& outcome) const {
 
 std::optional<StartedMap> Tracker::initialise(const Input& input, const FrontEndState& state,
                                               map::MapDraft& draft) const {
-  const InitialisationOptions& options = options_.tracking.initialisation;
+  InitialisationOptions options = options_.tracking.initialisation;
+  // If cameras lose images, the next frame may show only some of the landmarks.
+  const bool loses_images = state.incomplete_ns && to_seconds(input.frame.time_ns - *state.incomplete_ns) <= kGone_s;
+  if (loses_images) options.min_matched = std::max(options.min_matched, 2 * options_.tracking.min_inliers);
   const std::vector<std::uint8_t> gone = gone_cameras(state);
   const bool overlap = rig_.any_overlap(gone);
   if (overlap) {
@@ -103,7 +107,6 @@ std::optional<StartedMap> Tracker::initialise(const Input& input, const FrontEnd
 
 // Per camera of the rig: whether it belongs to another rig of the map, or has not been used for long.
 std::vector<std::uint8_t> Tracker::gone_cameras(const FrontEndState& state) const {
-  constexpr double kGone_s = 2.0;
   const std::size_t first = options_.first_camera, n = options_.num_cameras;
   std::vector<std::uint8_t> out(rig_.size(), 1);
   for (std::size_t c = first; c < first + n; ++c)
