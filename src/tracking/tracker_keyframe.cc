@@ -7,7 +7,6 @@
 #include "map/keyframe_landmarks.h"
 #include "tracking/feature_budget.h"
 #include "tracking/make_keyframe.h"
-#include "tracking/stereo_scale.h"
 #include "tracking/tracker.h"
 
 namespace bslam::tracking {
@@ -29,16 +28,8 @@ void Tracker::propose_keyframe(Input& input, const TrackOutput& output, TrackOut
   map::MapDraft draft(input.map);
   draft.add_visibility_counts(std::move(outcome.next.track.visibility_counts));
   if (relocaliser_) relocaliser_->describe(input.frame);
-  const InitialisationOptions& options = options_.tracking.initialisation;
-  const KeyframeId reference = output.result.anchored.reference;
-  geometry::SE3 T_rig_world = output.result.T_rig_world;
-  if (const auto factor = stereo_scale(*input.map, input.frame, output.matches, T_rig_world, options)) {
-    const geometry::SE3 T_rig_reference = T_rig_world * input.map->resolved_pose(reference).inverse();
-    draft.scale_submap(input.map->root_of(reference), *factor);
-    T_rig_world = geometry::scaled(T_rig_reference, *factor) * draft.map().resolved_pose(reference);
-    input.frame.twist = geometry::scaled(input.frame.twist, *factor);
-  }
-  NewKeyframe made = make_keyframe(input.frame, output.matches, T_rig_world, input.pyramids, reference, options, draft);
+  NewKeyframe made = make_keyframe(input.frame, output.matches, output.result.T_rig_world, input.pyramids,
+                                   output.result.anchored.reference, options_.tracking.initialisation, draft);
   outcome.edit = ProposedEdit{ProposedEdit::Kind::kKeyframe, std::move(draft), std::move(made.landmarks),
                               input.map->landmark_slots()};
   outcome.record.stages.push_back({"keyframe", watch.ms()});
