@@ -10,7 +10,6 @@ namespace {
 using geometry::Matrix6d;
 using geometry::Vector6d;
 
-constexpr int kMinObservations = 20;  // of an image that determines extrinsics
 constexpr double kMedianChi2SixDof = 5.348;
 constexpr std::size_t kMinPairs = 4;  // of successive images
 

@@ -54,13 +54,13 @@ std::optional<std::size_t> best_place(std::span<const std::size_t> poses, std::s
   std::optional<std::size_t> out;
   for (std::size_t i = 0; i + 1 < poses.size(); ++i) {
     sum += evidence[poses[i]].before;
-    images += evidence[poses[i]].observations > 0;
+    images += evidence[poses[i]].observations >= kMinObservations;
     if (sum <= most) continue;
     most = sum;
     images_before = images;
     out = poses[i + 1];
   }
-  if (!poses.empty()) images += evidence[poses.back()].observations > 0;
+  if (!poses.empty()) images += evidence[poses.back()].observations >= kMinObservations;
   return std::min(images_before, images - images_before) < kMinKeyframes ? std::nullopt : out;
 }
 
@@ -199,12 +199,13 @@ std::vector<PossibleMove> MovedCameras::likely_moves(const map::BundledMap& map,
 std::vector<camera::CameraMove> MovedCameras::at_best_times(const map::BundledMap& map, const RigProblem& problem,
                                                             const solver::RigValues& values) const {
   const std::vector<std::size_t> poses = poses_by_time(map, problem);
+  const std::vector<camera::CameraMove> moves = moves_of(values);
   std::vector<camera::CameraMove> out;
-  for (std::size_t m = 0; m < moves_.size(); ++m) {
+  for (std::size_t m = 0; m < moves.size(); ++m) {
     const std::vector<PoseEvidence> evidence = evidence_of(problem, values, before(m), cameras_ + m);
     const auto first_after = best_place(poses, evidence);
     if (!first_after) continue;
-    out.push_back(moves_of(values)[m]);
+    out.push_back(moves[m]);
     out.back().time_ns = time_of(map, problem, *first_after);
   }
   std::ranges::stable_sort(out, {}, &camera::CameraMove::time_ns);

@@ -79,7 +79,7 @@ class Rig {
 
   // Returns true if the fields of view of cameras i and j overlap at some depth. Sampled from the calibration.
   bool overlap(std::size_t i, std::size_t j) const { return overlap_share(i, j) > kMinOverlap; }
-  // Returns true if either camera sees what is in view of the other.
+  // overlap() in either direction.
   bool share_view(std::size_t i, std::size_t j) const { return overlap(i, j) || overlap(j, i); }
   // Fraction of camera i's image that is in view of camera j, in [0, 1]; the maximum over the sampled depths.
   double overlap_share(std::size_t i, std::size_t j) const { return calibration_->overlap[i * size() + j]; }

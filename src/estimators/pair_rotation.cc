@@ -76,7 +76,7 @@ void count(const EpipolarPose& given, std::span<const BearingPair> pairs, const 
   out.with_depth = found.with_depth;
 }
 
-// All members of the result except `agreed` and `behind`.
+// All members of the result except `agreed` and `brought_to_front`.
 PairRotation solve(const EpipolarPose& given, std::span<const BearingPair> pairs, std::span<const PlaneMatch> matches,
                    const Eigen::Vector3d& fixed, const PairRotationOptions& options) {
   constexpr double kFirstScale = 0.07, kShrink = 0.7;  // rad, per step
@@ -136,7 +136,7 @@ PairRotation pair_rotation(const EpipolarPose& given, std::span<const BearingPai
   PairRotation kept = solve(given, pairs, matches, axis, options);
   const double angle = rotation_to_front(corrected(given, kept.correction), pairs, axis, options.tolerance);
   if (angle != 0.0) {
-    kept.behind = true;
+    kept.brought_to_front = true;
     kept.correction = geometry::so3_exp(angle * axis).toRotationMatrix() * kept.correction;
     count(given, pairs, options, kept);
   }

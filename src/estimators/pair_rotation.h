@@ -17,8 +17,9 @@ struct PairRotation {
   // Matches that agree without and with the correction: on the epipolar plane, and in front of both cameras or too far
   // away to have a depth. `with_depth`: those of the latter that are not too far away.
   int agreed = 0, agree = 0, with_depth = 0;
-  // Several matches on the epipolar planes were behind the cameras without the correction.
-  bool behind = false;
+  // The correction includes a rotation that brings matches in front of the cameras: between 5 % and 85 % of those on
+  // their epipolar planes were behind them.
+  bool brought_to_front = false;
 };
 
 // Matches that agree with a relative pose, as in PairRotation.
@@ -33,8 +34,8 @@ EpipolarAgreement epipolar_agreement(const EpipolarPose& pose, std::span<const B
 // lengths is estimated as well, so that it is not taken for a rotation. The rotation about the axis that is
 // perpendicular to the baseline and the view changes mainly disparities. Small errors of the intrinsics, which are
 // common to all matches, look like a large one of it, so that it stays as given unless clearly more matches agree with
-// another one, or several matches are behind the cameras: it then brings these to infinity. More than half of the pairs
-// must be correct.
+// another one, or several matches are behind the cameras: the farthest of these are then brought to infinity. More than
+// half of the pairs must be correct.
 PairRotation pair_rotation(const EpipolarPose& given, std::span<const BearingPair> pairs,
                            const PairRotationOptions& options);
 

@@ -10,7 +10,7 @@ namespace bslam::map {
 // In order of id, each once.
 std::vector<LandmarkId> landmarks_of(const BundledMap& map, KeyframeId k);
 
-// Per camera of the rig, how many of them it observes.
+// Number of landmarks of the keyframe that each camera observes.
 std::vector<int> landmarks_by_camera(const BundledKeyframe& keyframe);
 
 }  // namespace bslam::map

@@ -82,8 +82,7 @@ void FrameBuilder::clear() {
   std::ranges::fill(current_masks_, image::ImageView());
 }
 
-void FrameBuilder::free_memory() {
-  clear();
+void FrameBuilder::free_scratch_memory() {
   for (feature::Extractor& extractor : extractors_) extractor = feature::Extractor(options_);
 }
 

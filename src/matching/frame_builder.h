@@ -47,8 +47,8 @@ class FrameBuilder {
   void adopt(ReleasedImages images);
   // Discards the images.
   void clear();
-  // Discards the images and the scratch memory of the extractors, which the next frame allocates again.
-  void free_memory();
+  // Frees the scratch memory of the extractors, which the next extraction allocates again.
+  void free_scratch_memory();
 
   // Memory of the pyramids and masks that it holds, in bytes.
   std::size_t memory_bytes() const;

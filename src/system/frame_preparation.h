@@ -37,7 +37,7 @@ class FramePreparation {
   tracking::FrameImages images() const { return {builder_.pyramids(), builder_.masks()}; }
   matching::ReleasedImages release() { return builder_.release(); }
   // See matching::FrameBuilder.
-  void free_memory() { builder_.free_memory(); }
+  void free_scratch_memory() { builder_.free_scratch_memory(); }
   std::size_t memory_bytes() const { return builder_.memory_bytes(); }
 
  private:

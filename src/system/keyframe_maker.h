@@ -54,7 +54,7 @@ class KeyframeMaker {
   FeatureEvidence take_evidence(FrameId frame);
 
   // As in pipeline.h. Not while `make` runs.
-  void free_memory() { builder_.free_memory(); }
+  void free_scratch_memory() { builder_.free_scratch_memory(); }
   std::size_t pyramid_bytes() const { return builder_.memory_bytes(); }
   std::size_t place_index_bytes() const { return tracker_.place_index_bytes(); }
 

@@ -56,8 +56,8 @@ class Pipeline {
   void set_reduction(int level);
   int reduction() const { return state_.reduction; }
 
-  // Frees the images of the last frame and scratch memory for the following ones.
-  void free_memory() { preparation_.free_memory(); }
+  // Frees memory that only further frames need.
+  void free_scratch_memory() { preparation_.free_scratch_memory(); }
 
   const tracking::Tracker& tracker() const { return tracker_; }
 

@@ -157,8 +157,10 @@ void System::bound_history() {
 
 void System::finish() {
   executor_->drain();
-  pipeline_.free_memory();
-  keyframe_maker_.free_memory();
+  if (!interruption_.stop_requested()) {  // else the worker of a stage may still use it
+    pipeline_.free_scratch_memory();
+    keyframe_maker_.free_scratch_memory();
+  }
   mark_created_keyframes();
   if (config_.final_adjustment && !config_.localize_only && !executor_->over()) {
     const Stopwatch watch;

@@ -80,15 +80,16 @@ bool MapDoubt::disowned(const TrackResult& result, const map::BundledMap& seen) 
          observed_by_cameras_of(result, seen);
 }
 
-// Returns true if a camera with keypoints in this frame observes several landmarks in some keyframe of the new map.
-// Without their images a frame is lost in every map.
+// Returns true if a camera with an image in this frame observes a considerable part of the landmarks of some keyframe
+// of the new map. Without such images a frame is lost in every map.
 bool MapDoubt::observed_by_cameras_of(const TrackResult& result, const map::BundledMap& seen) const {
-  constexpr int kMinLandmarks = 30;
+  constexpr int kMinKeypoints = 30, kPart = 4;  // at least a quarter
   for (std::size_t k = first_keyframe_; k < seen.keyframe_slots(); ++k) {
     if (!seen.alive(KeyframeId(k))) continue;
     const std::vector<int> landmarks = map::landmarks_by_camera(seen.keyframe(KeyframeId(k)));
+    const int all = std::ranges::max(landmarks);
     for (std::size_t c = 0; c < landmarks.size() && c < result.cameras.size(); ++c) {
-      if (landmarks[c] >= kMinLandmarks && result.cameras[c].keypoints > 0) return true;
+      if (kPart * landmarks[c] >= all && all > 0 && result.cameras[c].keypoints >= kMinKeypoints) return true;
     }
   }
   return false;

@@ -16,6 +16,7 @@ constexpr std::size_t kMinMatches = 60;
 constexpr double kMinAgreeing = 0.6;  // minimum fraction of the matches that agree with the correction
 constexpr int kMinWithDepth = 25;     // minimum number of these that are in front of both cameras
 constexpr double kClearly = 1.5;      // minimum factor by which the correction increases their number
+constexpr double kSome = 1.04;        // the same, if it brings matches in front of the cameras
 constexpr double kTolerancePx = 2.0;
 constexpr double kMaxAngle = 0.1;      // rad; a larger one is another arrangement of the cameras
 constexpr double kMinBaseline = 1e-3;  // m
@@ -69,7 +70,7 @@ std::optional<geometry::SE3> agreeing_pose(const camera::Rig& rig, std::size_t i
   const bool second = of_j.agree >= of_i.agree;
   const estimators::PairRotation& found = second ? of_j : of_i;
   if (found.agree < kMinAgreeing * static_cast<double>(matches.size())) return std::nullopt;
-  if (found.agree < kClearly * found.agreed && !found.behind) return T_j_i;
+  if (found.agree < (found.brought_to_front ? kSome : kClearly) * found.agreed) return T_j_i;
   if (found.with_depth < kMinWithDepth || other_mistake(rig.camera(i), rig.camera(j), T_j_i, matches, tolerance))
     return std::nullopt;
   const geometry::SE3 correction(Eigen::Quaterniond(found.correction), Eigen::Vector3d::Zero());

@@ -11,8 +11,9 @@ namespace bslam::tracking {
 
 // Returns the rig with corrected rotations of cameras, each relative to an earlier camera that overlaps with it. The
 // corrections are estimated from descriptor matches in `frame` that do not use the calibration. Returns nullopt unless
-// the correction of some camera makes clearly more matches agree, and most of them. Takes some 5 ms per pair. `given`:
-// the rig before any correction, from which no camera is rotated by more than some degrees.
+// the correction of some camera makes clearly more matches agree, or several that are behind the cameras as given, and
+// most of them. Takes some 5 ms per pair. `given`: the rig before any correction, from which no camera is rotated by
+// more than some degrees.
 std::optional<camera::Rig> with_corrected_rotations(const camera::Rig& rig, const camera::Rig& given,
                                                     const frame::BundledFrame& frame);
 

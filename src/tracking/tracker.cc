@@ -100,6 +100,7 @@ FrontEndState FrontEndState::restarted() const {
   state.blurred = blurred;
   state.planned_ns = planned_ns;
   state.unused_ns = unused_ns;
+  state.used = used;
   state.incomplete_ns = incomplete_ns;
   state.reduction = reduction;
   state.rig_corrections = rig_corrections;
@@ -128,8 +129,10 @@ FramePlan Tracker::plan(const image::ImageBundle& images, const ImageFaults& fau
   for (std::size_t c = 0; c < out.size(); ++c) out[c] = faults.outage[c] != CameraReason::kNone;
   count_unused(images.time_ns, out, state);
   const std::vector<std::uint8_t> gone = gone_cameras(state);
+  state.used.resize(out.size(), 0);
   for (std::size_t c = 0; c < out.size(); ++c) {
-    if (out[c] && !gone[c]) state.incomplete_ns = images.time_ns;
+    if (!out[c]) state.used[c] = 1;
+    if (out[c] && state.used[c] && !gone[c]) state.incomplete_ns = images.time_ns;
   }
   const bool recent = to_seconds(images.time_ns - state.track.time_ns) <= kMaxPrediction_s;
   const bool motion_known = state.track.twist && recent;

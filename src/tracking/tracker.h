@@ -68,7 +68,8 @@ struct FrontEndState {
   TrackerState track;
   std::vector<std::uint8_t> blurred;       // cameras that were blurred in the last frame
   TimeNs planned_ns = 0;                   // time of the last frame
-  std::optional<TimeNs> incomplete_ns;     // time of the last frame without an image of a camera that is in use
+  std::vector<std::uint8_t> used;          // cameras that had a usable image
+  std::optional<TimeNs> incomplete_ns;     // time of the last frame without a usable image of a camera that is in use
   std::vector<TimeNs> unused_ns;           // per camera, time since its last used image during which others were used
   std::vector<double> budget_fractions;    // per camera, fraction of the feature budget; empty: equal fractions
   std::vector<double> calibration_errors;  // per camera, px; empty: not estimated

@@ -32,13 +32,15 @@ bool too_old(const BundledFrame& reference, const BundledFrame& frame) {
          to_seconds(frame.time_ns - reference.time_ns) > kMaxStartAge_s;
 }
 
-// Returns true if the frame has keypoints of a camera of which no reference frame has.
-bool has_other_cameras(const BundledFrame& frame, std::span<const StartReference> references) {
+// Returns true if the frame has enough keypoints of a camera of which no reference frame has any.
+bool has_other_cameras(const BundledFrame& frame, std::span<const StartReference> references,
+                       std::size_t min_keypoints) {
   for (std::size_t c = 0; c < frame.cameras.size(); ++c) {
     const auto has_keypoints = [c](const StartReference& r) {
       return !r.candidate->frame->cameras[c].keypoints.empty();
     };
-    if (!frame.cameras[c].keypoints.empty() && std::ranges::none_of(references, has_keypoints)) return true;
+    if (frame.cameras[c].keypoints.size() >= min_keypoints && std::ranges::none_of(references, has_keypoints))
+      return true;
   }
   return false;
 }
@@ -96,10 +98,12 @@ std::optional<StartedMap> Tracker::initialise(const Input& input, const FrontEnd
   const bool single = std::ranges::count(gone, std::uint8_t{0}) <= 1;
   if (metric && (overlap || single)) return std::nullopt;
   const int metric_attempts = overlap ? kMetricAttempts : 0;
+  if (state.start_references.empty()) return std::nullopt;
+  const FrameId oldest = state.start_references.front().candidate->frame->id;
+  if (input.frame.id.value() - oldest.value() < metric_attempts) return std::nullopt;
   const Random random(options_.seed, "start", static_cast<std::uint64_t>(input.frame.id.value()));
   for (const StartReference& reference : state.start_references) {
     const StartCandidate& first = *reference.candidate;
-    if (input.frame.id.value() - state.start_references.front().candidate->frame->id.value() < metric_attempts) break;
     if (auto started = initialise_monocular(first, input.frame, input.pyramids, options, random, draft)) return started;
   }
   return std::nullopt;
@@ -152,7 +156,7 @@ void Tracker::keep_reference_frame(Input& input, FrontEndState& state) const {
     return too_old(first, input.frame) || !comparable(first, input.frame, options);
   });
   const auto kept = std::make_shared<const BundledFrame>(std::move(input.frame));
-  if (references.empty() || has_other_cameras(*kept, references)) {
+  if (references.empty() || has_other_cameras(*kept, references, static_cast<std::size_t>(options.min_monocular))) {
     const StartCandidate candidate{kept, {input.pyramids.begin(), input.pyramids.end()}};
     references.push_back({std::make_shared<const StartCandidate>(candidate)});
   }

@@ -85,7 +85,7 @@ TEST(PairRotation, BringsPointsBehindTheCamerasToInfinity) {
     const PairRotation found = pair_rotation(given, pairs, {.tolerance = 1.5e-3});
     const Eigen::Vector3d left =
         geometry::so3_log(Eigen::Quaterniond(found.correction.transpose() * error)) / geometry::radians(1);
-    EXPECT_TRUE(found.behind);
+    EXPECT_TRUE(found.brought_to_front);
     EXPECT_LT(left.norm(), 0.35 * turn_deg + 0.1) << turn_deg;
     EXPECT_GT(found.agree, 250);
   }
@@ -95,7 +95,7 @@ TEST(PairRotation, DoesNotChangeDisparitiesIfNoPointIsBehindTheCameras) {
   Random random(8);
   const EpipolarPose given{Eigen::Matrix3d::Identity(), -Eigen::Vector3d::UnitX()};
   const PairRotation found = pair_rotation(given, matches_of(given, 0.11, 5, random), {.tolerance = 2e-3});
-  EXPECT_FALSE(found.behind);
+  EXPECT_FALSE(found.brought_to_front);
   EXPECT_LT(geometry::so3_log(Eigen::Quaterniond(found.correction)).norm(), 1e-3);
 }
 

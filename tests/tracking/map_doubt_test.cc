@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "tracking/camera_consensus.h"
 #include "tracking/simulated_tracker.h"
 
 namespace bslam::tracking {
@@ -30,7 +31,12 @@ const camera::Rig& rig() {
 // A run whose map consists of a number of keyframes.
 class DoubtfulRun {
  public:
-  explicit DoubtfulRun(map::Scale scale, std::size_t keyframes = 2) : scale_(scale), world_(simulator(rig())) {
+  // `without`: a camera that has no images in the keyframes.
+  explicit DoubtfulRun(map::Scale scale, std::size_t keyframes = 2, std::optional<std::size_t> without = {})
+      : scale_(scale), world_(simulator(rig())) {
+    world_.change_frame = [without](frame::BundledFrame& frame) {
+      if (without) remove_camera(rig(), *without, 5e-4, 7.81, frame);
+    };
     add_keyframes(keyframes);
   }
 
@@ -109,11 +115,11 @@ TEST(MapDoubt, AMapThatIsMetricOrOldOrLargeIsRightIfTrackingIsLost) {
 
 // If each camera loses some of its images, a frame may have none of those that observe the map.
 TEST(MapDoubt, ANewMapIsNotWrongIfNoCameraThatObservesItHasAnImage) {
-  DoubtfulRun run(map::Scale::kUpToScale);
+  DoubtfulRun run(map::Scale::kUpToScale, 2, /*without=*/2);
   run.start(1.0);
   FrameRecord record = DoubtfulRun::lost(1.1);
-  for (CameraCounts& camera : record.result.cameras) camera.keypoints = 0;
-  EXPECT_FALSE(run.update(record));
+  for (const std::size_t c : {0, 1}) record.result.cameras[c].keypoints = 0;
+  EXPECT_FALSE(run.update(record)) << "only camera 2 has an image";
   record.result.cameras[1].keypoints = 1000;
   EXPECT_TRUE(run.update(record));
 }
