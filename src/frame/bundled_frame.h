@@ -2,6 +2,7 @@
 // are immutable and shared by its copies.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "base/id.h"
@@ -23,6 +24,12 @@ struct CameraFrame {
   SharedArray<WordId> words;     // per keypoint, word of the vocabulary; empty until computed
 };
 
+// What the matched features of a frame say about the size of a map whose scale is not known.
+struct StereoScale {
+  double factor = 1;    // by which the map is too small
+  int gauge_epoch = 0;  // of the map, which has another size in other epochs
+};
+
 struct BundledFrame {
   FrameId id;
   TimeNs time_ns = 0;
@@ -31,6 +38,8 @@ struct BundledFrame {
   // Velocity of the rig during the capture, rad/s and m/s (see camera::Rig::moving), estimated by tracking; zero if
   // unknown. For keyframes BundledKeyframe::twist is used instead.
   geometry::Vector6d twist = geometry::Vector6d::Zero();
+  std::optional<StereoScale> stereo_scale =
+      {};  // of a keyframe, found by tracking for mapping (tracking/stereo_scale.h)
 
   const feature::Keypoints& keypoints(CameraIndex c) const { return cameras[c.index()].keypoints; }
   std::size_t num_keypoints() const;

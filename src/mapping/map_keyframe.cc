@@ -81,6 +81,7 @@ void adjust_locally(KeyframeId keyframe, const Mapping& mapping, map::MapDraft& 
 void map_keyframe(KeyframeId keyframe, const MappingOptions& options, const FeatureModel& features,
                   map::MapDraft& draft, std::stop_token stop, std::shared_ptr<const Eigen::MatrixXd> rig_prior) {
   complete_motion_of_root(keyframe, draft);
+  apply_stereo_scale(keyframe, draft);
   cull_landmarks(keyframe, options.culling, draft);
   create_landmarks(keyframe, options.creation, features, draft);
   fuse_landmarks(keyframe, options.fusion, features, draft);

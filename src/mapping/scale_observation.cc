@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "adjustment/bundle_problem.h"
@@ -97,6 +98,24 @@ ScaleReport observe_scale(KeyframeId keyframe, const ScaleOptions& options, cons
   const double left = std::abs(found->scale / correction - 1.0);
   draft.set_scale(map::Scale::kUnobservable, std::max(found->deviation, left));
   return report;
+}
+
+void apply_stereo_scale(KeyframeId keyframe, map::MapDraft& draft) {
+  const map::BundledMap& map = draft.map();
+  const std::optional<frame::StereoScale> found = map.keyframe(keyframe).frame->stereo_scale;
+  if (!found || map.scale() != map::Scale::kUnobservable || found->gauge_epoch != map.gauge_epoch()) return;
+  draft.scale_submap(map.root_of(keyframe), found->factor);
+  draft.set_scale(map::Scale::kUnobservable, std::numeric_limits<double>::infinity());
+  const map::BundledKeyframe& entry = map.keyframe(keyframe);
+  const geometry::SE3 T_world_rig = entry.T_rig_world.inverse();
+  map::SetPoses moved;
+  for (std::size_t f = 0; f < entry.frame->bundled.num_matched(); ++f) {
+    const LandmarkId l = entry.landmarks[f];
+    const auto& point = entry.frame->bundled.point(FeatureId(f));
+    if (l.valid() && point && map.observations(l).size() == 1)
+      moved.landmarks.emplace_back(l, T_world_rig * point->point_rig);
+  }
+  draft.set_poses(std::move(moved));
 }
 
 bool is_metric(const ScaleReport& report, double deviation_before, const ScaleOptions& options) {

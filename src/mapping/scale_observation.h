@@ -23,6 +23,10 @@ struct ScaleReport {
 ScaleReport observe_scale(KeyframeId keyframe, const ScaleOptions& options, const FeatureModel& features,
                           map::MapDraft& draft);
 
+// Scales the submap of a keyframe as its matched features show (frame::StereoScale), if the map was not corrected since
+// they were compared with it, and puts the landmarks that they created at their places again.
+void apply_stereo_scale(KeyframeId keyframe, map::MapDraft& draft);
+
 // Returns true if the map can be declared metric: this estimate and the previous one, whose deviation is
 // `deviation_before`, are both accurate enough, and this estimate did not change the scale significantly.
 bool is_metric(const ScaleReport& report, double deviation_before, const ScaleOptions& options);

@@ -7,6 +7,7 @@
 #include "map/keyframe_landmarks.h"
 #include "tracking/feature_budget.h"
 #include "tracking/make_keyframe.h"
+#include "tracking/stereo_scale.h"
 #include "tracking/tracker.h"
 
 namespace bslam::tracking {
@@ -28,6 +29,8 @@ void Tracker::propose_keyframe(Input& input, const TrackOutput& output, TrackOut
   map::MapDraft draft(input.map);
   draft.add_visibility_counts(std::move(outcome.next.track.visibility_counts));
   if (relocaliser_) relocaliser_->describe(input.frame);
+  input.frame.stereo_scale = stereo_scale(*input.map, input.frame, output.matches, output.result.T_rig_world,
+                                          options_.tracking.initialisation);
   NewKeyframe made = make_keyframe(input.frame, output.matches, output.result.T_rig_world, input.pyramids,
                                    output.result.anchored.reference, options_.tracking.initialisation, draft);
   outcome.edit = ProposedEdit{ProposedEdit::Kind::kKeyframe, std::move(draft), std::move(made.landmarks),

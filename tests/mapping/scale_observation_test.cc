@@ -103,6 +103,26 @@ TEST(ObserveScale, ConvergesFromThreeTimesTooLargeOrTooSmall) {
   }
 }
 
+TEST(ObserveScale, FollowsMatchedFeaturesUnlessTheMapWasCorrectedSince) {
+  constexpr double kSize = 1.4;
+  for (const map::Scale scale : {map::Scale::kUnobservable, map::Scale::kMetric}) {
+    SimulatedMap world(synthetic::FeatureSimulator(three_sides(), orbit(1), room(1)));
+    world.change_frame = [](frame::BundledFrame& frame) { frame.stereo_scale = frame::StereoScale{1 / kSize, 1}; };
+    for (int i = 0; i < 4; ++i) world.add_keyframe(FrameId(i), 0.25 * i);
+    world.map.set_scale(scale);
+    world.map.scale_submap(KeyframeId(0), kSize);
+    ASSERT_EQ(world.map.gauge_epoch(), 1);
+    map::MapDraft draft = world.draft();
+    apply_stereo_scale(KeyframeId(3), draft);
+    const double left = scale == map::Scale::kUnobservable ? 1.0 : kSize;
+    EXPECT_NEAR(length_ratio(world, draft.map()), left, 1e-9);
+    EXPECT_EQ(draft.map().scale(), scale);
+    apply_stereo_scale(KeyframeId(3), draft);
+    EXPECT_NEAR(length_ratio(world, draft.map()), left, 1e-9) << "once";
+    EXPECT_EQ(draft.map().check_invariants(), std::nullopt);
+  }
+}
+
 // Two submaps with different scales, the older one of which has `keyframes` keyframes.
 SimulatedMap with_older_submap(int keyframes) {
   SimulatedMap world = simulated_map(orbit(1), three_sides(), keyframes, 1.4, 1);
