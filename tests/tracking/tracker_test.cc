@@ -507,24 +507,30 @@ TEST(Tracker, PlanSkipsFaultyCameras) {
   EXPECT_EQ(plan.budgets[1], 0);
 }
 
-// The next frame may show only some of the landmarks.
+// The next frame may show only some of the landmarks. A camera that never had an image does not count.
 TEST(Tracker, NeedsMoreFeaturesForAMetricStartWhileCamerasLoseImages) {
   TrackerOptions options;
   options.tracking.min_inliers = 1000;
-  TrackerRun run(synthetic::ring_rig(3), options);
-  const auto starts = [&](int i, CameraReason of_camera_2) {
-    image::ImageBundle images;
-    images.images.resize(3);
-    images.time_ns = run.frame(i).time_ns;
-    run.tracker.plan(images, {{CameraReason::kNone, CameraReason::kNone, of_camera_2}, {0, 0, 0}, {0, 0, 0}},
-                     run.state);
-    run.process(run.frame(i));
-    return run.store.snapshot()->num_keyframes() > 0;
-  };
-  EXPECT_FALSE(starts(0, CameraReason::kNoImages));
-  EXPECT_FALSE(starts(1, CameraReason::kNone)) << "shortly afterwards";
-  EXPECT_TRUE(starts(45, CameraReason::kNone));
-  EXPECT_EQ(run.store.snapshot()->scale(), map::Scale::kMetric);
+  for (const bool had_images : {true, false}) {
+    TrackerRun run(synthetic::ring_rig(3), options);
+    const auto plan = [&](int i, CameraReason of_camera_2) {
+      image::ImageBundle images;
+      images.images.resize(3);
+      images.time_ns = run.frame(i).time_ns;
+      run.tracker.plan(images, {{CameraReason::kNone, CameraReason::kNone, of_camera_2}, {0, 0, 0}, {0, 0, 0}},
+                       run.state);
+    };
+    const auto starts = [&](int i, CameraReason of_camera_2) {
+      plan(i, of_camera_2);
+      run.process(run.frame(i));
+      return run.store.snapshot()->num_keyframes() > 0;
+    };
+    plan(0, had_images ? CameraReason::kNone : CameraReason::kNoImages);
+    EXPECT_EQ(starts(1, CameraReason::kNoImages), !had_images);
+    EXPECT_EQ(starts(2, CameraReason::kNone), !had_images) << "shortly afterwards";
+    EXPECT_TRUE(starts(45, CameraReason::kNone));
+    EXPECT_EQ(run.store.snapshot()->scale(), map::Scale::kMetric);
+  }
 }
 
 TEST(Tracker, ABlurredCameraIsReadmittedOnceItIsSharp) {
