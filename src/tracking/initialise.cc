@@ -8,6 +8,7 @@
 #include "estimators/generalised_scale.h"
 #include "feature/descriptor_matching.h"
 #include "frame/rig_at.h"
+#include "tracking/stereo_scale.h"
 
 namespace bslam::tracking {
 namespace {
@@ -83,21 +84,19 @@ struct InitialScale {
 std::optional<InitialScale> scale_of_matched_features(const TwoView& view, const BundledFrame& first,
                                                       const camera::Rig& rig, const InitialisationOptions& options) {
   constexpr std::size_t kMinFeatures = 3;
-  constexpr double kSigmaOfMedian = 1.4826;  // standard deviation per median absolute deviation of normal noise
   const CameraIndex camera(view.camera);
   std::vector<double> ratios;
   for (std::size_t i = 0; i < view.pairs.size(); ++i) {
     if (!view.pose.inlier[i]) continue;
-    const FeatureId f = first.bundled.feature(camera, view.pairs[i].a);
-    if (f.index() >= first.bundled.num_matched() || !has_accurate_depth(first.bundled.point(f), options)) continue;
-    const double depth = (rig.cam_from_rig(view.camera) * first.bundled.point(f)->point_rig).norm();
+    const auto& point = first.bundled.point(first.bundled.feature(camera, view.pairs[i].a));
+    if (!has_accurate_depth(point, options)) continue;
+    const double depth = (rig.cam_from_rig(view.camera) * point->point_rig).norm();
     ratios.push_back(depth / view.pose.points_a[i].norm());
   }
   if (ratios.size() < kMinFeatures) return std::nullopt;
-  const double ratio = median(ratios);
-  for (double& r : ratios) r = std::abs(std::log(r / ratio));
-  const double deviation = kSigmaOfMedian * median(ratios) + options.max_depth_error;
-  return InitialScale{ratio, deviation / std::sqrt(static_cast<double>(ratios.size()))};
+  const double features = static_cast<double>(ratios.size());
+  const auto [ratio, deviation] = median_ratio(std::move(ratios));
+  return InitialScale{ratio, (deviation + options.max_depth_error) / std::sqrt(features)};
 }
 
 // Returns the length of the motion of a camera above which the rotation of the rig changes the direction of motion of

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <vector>
 
 #include "frame/bundled_frame.h"
 #include "map/bundled_map.h"
@@ -9,6 +10,15 @@
 #include "tracking/options.h"
 
 namespace bslam::tracking {
+
+// The median of ratios of distances, and the standard deviation of the logarithm of one ratio, which wrong ones hardly
+// change.
+struct MedianRatio {
+  double ratio = 1, deviation = 0;
+};
+
+// `ratios` must not be empty.
+MedianRatio median_ratio(std::vector<double> ratios);
 
 // Compares features that several cameras of the frame matched with their landmarks, which single cameras have mapped so
 // far: the factor is the median ratio of their distances. In such a map the landmarks are searched for at wrong places

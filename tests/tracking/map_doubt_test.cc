@@ -35,7 +35,8 @@ class DoubtfulRun {
   explicit DoubtfulRun(map::Scale scale, std::size_t keyframes = 2, std::optional<std::size_t> without = {})
       : scale_(scale), world_(simulator(rig())) {
     world_.change_frame = [without](frame::BundledFrame& frame) {
-      if (without) remove_camera(rig(), *without, 5e-4, 7.81, frame);
+      const InitialisationOptions options;
+      if (without) remove_camera(rig(), *without, options.min_parallax, options.max_chi2, frame);
     };
     add_keyframes(keyframes);
   }
