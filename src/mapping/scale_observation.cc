@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "adjustment/bundle_problem.h"
+#include "mapping/predicted_matches.h"
 #include "mapping/rig_scale.h"
 
 namespace bslam::mapping {
@@ -21,6 +22,8 @@ constexpr double kMinCorrectionSigmas = 0.5;  // in standard deviations: a small
 // if an estimate differs from its scale by more than both limits.
 constexpr std::size_t kCheckInterval = 4;
 constexpr double kContradictionSigmas = 5.0, kContradiction = 0.05;
+// Relative standard deviation of the scale without predicted matches up to which they are used.
+constexpr double kMaxIndependentDeviation = 0.1;
 
 // Only the oldest keyframe is fixed: fixing more would constrain the shape from which the scale is estimated.
 adjustment::Selection select_observers(const map::BundledMap& map, KeyframeId keyframe, int limit) {
@@ -54,12 +57,27 @@ bool due(const map::BundledMap& map, KeyframeId keyframe) {
 // No estimate is made from more than `keyframes` keyframes.
 int min_keyframes(const ScaleOptions& options) { return std::min(options.min_keyframes, options.keyframes); }
 
-// Returns true if an estimate from this number of keyframes contradicts the scale of a metric map.
+// Returns true if an estimate from this number of keyframes contradicts the scale that the map has.
 bool contradicts(const RigScale& found, const map::BundledMap& map, std::size_t keyframes,
                  const ScaleOptions& options) {
-  const double deviation = std::hypot(found.deviation, map.scale_deviation());
+  const bool metric = map.scale() == map::Scale::kMetric;
+  const double deviation = metric ? std::hypot(found.deviation, map.scale_deviation()) : found.deviation;
   return static_cast<int>(keyframes) >= min_keyframes(options) &&
          std::abs(std::log(found.scale)) > std::max(kContradictionSigmas * deviation, kContradiction);
+}
+
+// Predicted matches confirm the scale that the map has, right or wrong. So they are used only if the scale is known
+// without them and they agree, or if they contradict it.
+std::optional<RigScale> estimate_scale(const adjustment::BundleProblem& selected, const map::BundledMap& map,
+                                       const ScaleOptions& options) {
+  const RigScaleOptions rig_options{.sigma_rotation = geometry::radians(options.sigma_rotation_deg),
+                                    .correlated_observations = options.correlated_observations};
+  const auto all = rig_scale(selected.problem, rig_options);
+  if (all && contradicts(*all, map, selected.keyframes.size(), options)) return all;
+  const auto independent = rig_scale(without_predicted_matches(selected.problem), rig_options);
+  if (!all || !independent || independent->deviation > kMaxIndependentDeviation) return independent;
+  const bool agree = std::abs(std::log(all->scale / independent->scale)) <= independent->deviation;
+  return agree ? all : independent;
 }
 
 // A calibration that was estimated from a map of wrong scale is wrong as well.
@@ -77,8 +95,7 @@ ScaleReport observe_scale(KeyframeId keyframe, const ScaleOptions& options, cons
   if (!due(map, keyframe)) return report;
   const adjustment::Selection selection = select_observers(map, keyframe, options.keyframes);
   const auto selected = adjustment::build_problem(map, selection, features);
-  const auto found = rig_scale(selected.problem, {.sigma_rotation = geometry::radians(options.sigma_rotation_deg),
-                                                  .correlated_observations = options.correlated_observations});
+  const std::optional<RigScale> found = estimate_scale(selected, map, options);
   if (!found) return report;
   if (map.scale() == map::Scale::kMetric) {
     if (!contradicts(*found, map, selected.keyframes.size(), options)) return report;
