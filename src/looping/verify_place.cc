@@ -197,6 +197,7 @@ std::optional<PlaceMatch> verify_place(const map::BundledMap& map, const camera:
   }
   const int most = std::min(out.expected, static_cast<int>(frame.bundled.size()));  // that can be found
   if (out.found < options.min_found_ratio * most) return rejected(Rejection::kFewFound);
+  if (most > 0) place_match.found_ratio = static_cast<double>(out.found) / most;
   return place_match;
 }
 

@@ -17,9 +17,10 @@ struct PlaceMatch {
   KeyframeId matched_keyframe;  // the verified candidate
   geometry::SE3 T_rig_world;    // pose of the frame
   std::vector<std::pair<FeatureId, LandmarkId>>
-      matches;       // inliers in order of feature; no feature and no landmark occurs twice
-  int inliers = 0;   // number of inlier keypoints
-  double scale = 1;  // scale of the map at the place over the scale at the frame (looping/relative_scale.h)
+      matches;             // inliers in order of feature; no feature and no landmark occurs twice
+  int inliers = 0;         // number of inlier keypoints
+  double found_ratio = 1;  // of the landmarks predicted visible, or of the features of the frame if these are fewer
+  double scale = 1;        // scale of the map at the place over the scale at the frame (looping/relative_scale.h)
 };
 
 // The reason for which a candidate was rejected.

@@ -17,7 +17,8 @@ std::optional<tracking::FoundPlace> PlaceRelocaliser::verify_place(const map::Bu
   const Random random(seed_, "relocalise", static_cast<std::uint64_t>(frame.id.value()));
   auto found = looping::relocalise(*recogniser_, map, frame, options_, features_, random);
   if (!found) return std::nullopt;
-  return tracking::FoundPlace{found->matched_keyframe, found->T_rig_world, std::move(found->matches), found->inliers};
+  return tracking::FoundPlace{found->matched_keyframe, found->T_rig_world, std::move(found->matches), found->inliers,
+                              found->found_ratio};
 }
 
 std::unique_ptr<tracking::Relocaliser> make_relocaliser(const place::VocabularyPtr& vocabulary, const Config& config) {

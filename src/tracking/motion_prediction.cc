@@ -47,6 +47,20 @@ solver::MotionModel motion_model(const TrackInput& input, const frame::BundledFr
   return motion;
 }
 
+bool is_plausible(const FoundPlace& place, const map::BundledMap& map, const TrackerState& state, TimeNs time_ns) {
+  constexpr double kSpeeds = 2.0, kClearlyFound = 0.4;
+  const std::optional<SE3> T_rig_world = state.anchored.resolve(map);
+  if (!T_rig_world || !state.twist || place.found_ratio >= kClearlyFound ||
+      map.root_of(map.nearest_alive_ancestor(state.anchored.reference)) != map.root_of(place.matched_keyframe))
+    return true;
+  std::vector<double> distances;
+  for (const auto& [feature, l] : place.matches)
+    distances.push_back((place.T_rig_world * map.landmark(l).position).norm());
+  const double travelled = kSpeeds * state.twist->tail<3>().norm() * to_seconds(time_ns - state.time_ns);
+  const double distance = (T_rig_world->inverse().translation() - place.T_rig_world.inverse().translation()).norm();
+  return distance <= travelled + (distances.empty() ? 0.0 : median(distances));
+}
+
 double image_motion_px(const map::BundledMap& map, const TrackerState& state) {
   if (!state.twist || !state.anchored.known_in(map)) return 0.0;
   const SE3 T_after = state.anchored.resolve(map).value();

@@ -14,6 +14,8 @@ struct FoundPlace {
   geometry::SE3 T_rig_world;                              // pose of the frame
   std::vector<std::pair<FeatureId, LandmarkId>> matches;  // inliers
   int inliers = 0;                                        // number of inlier keypoints
+  // Of the landmarks predicted visible, or of the features of the frame if these are fewer.
+  double found_ratio = 1;
 };
 
 class Relocaliser {

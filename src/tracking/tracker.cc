@@ -327,7 +327,6 @@ void Tracker::handle_lost(Input& input, const TrackerState& before, TrackOutcome
     state.track.status = TrackStatus::kLost;
     state.pending.reset();
   }
-  if (!recent) state.track.twist.reset();
   update_odometry(*input.map, before, outcome);
   if (!had_features(result)) return;
   if (state.frames_lost++ == 0) state.lost_since_ns = result.time_ns;
@@ -343,7 +342,7 @@ bool Tracker::relocalise(Input& input, TrackOutcome& outcome) {
   relocaliser_->describe(input.frame);
   const std::optional<FoundPlace> place = relocaliser_->verify_place(*input.map, input.frame);
   outcome.record.stages.push_back({"relocalise", watch.ms()});
-  if (!place) return false;
+  if (!place || !is_plausible(*place, *input.map, outcome.next.track, input.frame.time_ns)) return false;
   std::vector<LandmarkId> landmarks;
   std::vector<int> seen(rig_.size(), 0);
   for (const auto& [feature, l] : place->matches) {
