@@ -22,4 +22,16 @@ std::vector<int> landmarks_by_camera(const BundledKeyframe& keyframe) {
   return seen;
 }
 
+std::vector<LandmarkId> observed_by(const BundledMap& map, std::span<const LandmarkId> landmarks, CameraIndex camera) {
+  const auto observes = [&](const Observation& o) {
+    return std::ranges::any_of(map.keyframe(o.keyframe).frame->bundled.keypoints(o.feature),
+                               [&](const frame::KeypointRef& r) { return r.camera == camera; });
+  };
+  std::vector<LandmarkId> out;
+  for (const LandmarkId l : landmarks) {
+    if (std::ranges::any_of(map.observations(l), observes)) out.push_back(l);
+  }
+  return out;
+}
+
 }  // namespace bslam::map

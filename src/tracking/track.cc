@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <numeric>
 
 #include "frame/rig_at.h"
+#include "map/keyframe_landmarks.h"
 #include "tracking/keyframe_decision.h"
 #include "tracking/motion_prediction.h"
 #include "tracking/robust_pose.h"
@@ -224,7 +224,8 @@ struct Fine {
   AlignedMatches aligned;    // for all of `matches`
   std::vector<LandmarkId> visible;
   std::vector<LandmarkCounts> views;  // per camera: landmarks of the local view that are expected and found
-  std::vector<LandmarkCounts> wide;   // the same with wide windows; empty unless an excluded camera is due for a retry
+  std::vector<LandmarkCounts> own;    // of excluded cameras: the same, of landmarks that the camera itself has observed
+  std::vector<LandmarkCounts> wide;   // `views` with wide windows; empty unless an excluded camera is due for a retry
   MotionContest contest{};            // also that of the coarse estimation
 };
 
@@ -236,6 +237,19 @@ std::vector<LandmarkCounts> landmark_counts(const MatchSearch& search) {
   return out;
 }
 
+// See Fine::own.
+std::vector<LandmarkCounts> own_landmark_counts(const TrackInput& input, const Coarse& coarse,
+                                                std::span<const LandmarkId> landmarks,
+                                                const matching::ProjectionSearchOptions& windows, ThreadPool& pool) {
+  std::vector<LandmarkCounts> out(coarse.excluded.size());
+  for (std::size_t c = 0; c < out.size(); ++c) {
+    if (!coarse.excluded[c]) continue;
+    const std::vector<LandmarkId> own = map::observed_by(input.map, landmarks, CameraIndex(c));
+    out[c] = landmark_counts(find_landmarks(input.map, coarse.frame, coarse.T_rig_world, own, {}, windows, pool))[c];
+  }
+  return out;
+}
+
 // Pose from all landmarks of the local view, with keypoints aligned to their landmarks' patches.
 Fine track_local_view(const TrackInput& input, const Coarse& coarse, const TrackingOptions& options, ThreadPool& pool) {
   const map::BundledMap& map = input.map;
@@ -244,10 +258,11 @@ Fine track_local_view(const TrackInput& input, const Coarse& coarse, const Track
   const std::vector<LandmarkId> seeds = any_matches ? landmarks_of(coarse.matches) : last_landmarks(map, input.state);
   const std::vector<LandmarkId> near =
       map::local_landmarks(map, seeds, input.state.anchored.reference, options.local_view);
-  MatchSearch search = find_landmarks(map, frame, coarse.T_rig_world, near, coarse.matches,
-                                      search_options(input, options.matching, options.matching.local_radius), pool);
+  const auto narrow = search_options(input, options.matching, options.matching.local_radius);
+  MatchSearch search = find_landmarks(map, frame, coarse.T_rig_world, near, coarse.matches, narrow, pool);
   Fine out;
   out.views = landmark_counts(search);
+  out.own = own_landmark_counts(input, coarse, near, narrow, pool);
   if (any_due_for_retry(input.state, frame.time_ns, options.consensus)) {
     auto windows = search_options(input, options.matching, options.matching.wide_radius);
     windows.ratio = 0.8 * options.matching.ratio;
@@ -335,7 +350,9 @@ void update_cameras(const Coarse& coarse, const Fine& fine, const ConsensusOptio
     CameraConsensusState& camera = out.state.cameras[c];
     out.result.cameras[c].excluded = coarse.excluded[c];
     if (coarse.excluded[c]) {
-      update_exclusion(camera, fine.views[c], ratio_of_used, frame.time_ns, options);
+      // Landmarks of other cameras may look different in its image.
+      const bool enough = fine.own[c].expected >= options.min_expected;
+      update_exclusion(camera, enough ? fine.own[c] : fine.views[c], ratio_of_used, frame.time_ns, options);
       const bool tried = !fine.wide.empty() && fine.wide[c].expected > 0;
       if (tried && due_for_retry(camera, frame.time_ns, options))
         retry(camera, fine.views[c], fine.wide[c], frame.time_ns, options);

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "map/keyframe_landmarks.h"
 #include "tracking/simulated_tracker.h"
 
 namespace bslam::tracking {
@@ -218,6 +219,38 @@ TEST_F(WrongImages, AreExcludedForACameraOfHalfTheRate) {
     ASSERT_EQ(out.result.status, TrackStatus::kTracking) << i;
     if (i % 2 == 1) continue;
     EXPECT_EQ(out.result.cameras[2].excluded, i >= 10 && i < readmitted) << i;
+  }
+}
+
+// Most landmarks in the view of the fisheye are known from the front cameras only, and look different in its image.
+TEST(ExcludedCamera, IsComparedWithTheLandmarksThatItHasObserved) {
+  constexpr std::size_t kFisheye = 2;
+  auto few = room();
+  few.max_keypoints = 60;
+  map::SimulatedMap world(simulator(synthetic::mixed_rig(), few));
+  world.add_keyframe(FrameId(1000), 0.0);
+  const auto own = map::observed_by(world.map, world.map.landmark_ids(), CameraIndex(kFisheye));
+  ASSERT_GE(static_cast<int>(own.size()), ConsensusOptions{}.min_expected);
+  world.sim = simulator(synthetic::mixed_rig());
+  world.change_frame = [&](frame::BundledFrame& frame) { remove_camera(world.sim.rig(), kFisheye, 5e-4, 7.81, frame); };
+  for (int i = 1; i < 10; ++i) world.add_keyframe(FrameId(1000 + i), 0.1 * i);
+  EXPECT_EQ(map::observed_by(world.map, world.map.landmark_ids(), CameraIndex(kFisheye)), own);
+
+  SimulatedTracker tracker(world);
+  for (int i = 1; i < 12; ++i) {
+    synthetic::SimulatedFrame seen = world.sim.frame(FrameId(i), 0.05 * i);
+    auto& keypoints = seen.frame.cameras[kFisheye].keypoints;
+    std::vector<feature::Descriptor> descriptors = keypoints.descriptor.copy();
+    for (std::size_t k = 0; k < keypoints.size(); ++k) {
+      const auto known = world.landmark_of.find(seen.landmark[kFisheye][k]);
+      const bool is_own = known != world.landmark_of.end() && std::ranges::binary_search(own, known->second);
+      if (!is_own) descriptors[k].fill(0);
+    }
+    keypoints.descriptor = std::move(descriptors);
+    const TrackOutput out = tracker.track(seen.frame);
+    ASSERT_EQ(out.result.status, TrackStatus::kTracking) << i;
+    EXPECT_EQ(out.result.cameras[kFisheye].excluded, i > 3 && i <= 3 + ConsensusOptions{}.readmit_after) << i;
+    if (i == 3) update_exclusion(tracker.state.cameras[kFisheye], {100, 0}, 1.0, seen.frame.time_ns, {});
   }
 }
 
