@@ -76,7 +76,7 @@ void count(const EpipolarPose& given, std::span<const BearingPair> pairs, const 
   out.with_depth = found.with_depth;
 }
 
-// All members of the result except `agreed` and `brought_to_front`.
+// All members of the result except `brought_to_front`.
 PairRotation solve(const EpipolarPose& given, std::span<const BearingPair> pairs, std::span<const PlaneMatch> matches,
                    const Eigen::Vector3d& fixed, const PairRotationOptions& options) {
   constexpr double kFirstScale = 0.07, kShrink = 0.7;  // rad, per step
@@ -87,6 +87,7 @@ PairRotation solve(const EpipolarPose& given, std::span<const BearingPair> pairs
   for (int i = 0; i < kLastSteps; ++i) advance(matches, options.tolerance, fixed, options, estimate);
   PairRotation out;
   out.correction = estimate.correction;
+  out.focal_error = estimate.focal_error;
   count(given, pairs, options, out);
   return out;
 }
@@ -141,9 +142,7 @@ PairRotation pair_rotation(const EpipolarPose& given, std::span<const BearingPai
     count(given, pairs, options, kept);
   }
   const PairRotation free = solve(given, pairs, matches, Eigen::Vector3d::Zero(), options);
-  PairRotation out = free.agree > kClearly * kept.agree ? free : kept;
-  out.agreed = epipolar_agreement(given, pairs, options.tolerance).all;
-  return out;
+  return free.agree > kClearly * kept.agree ? free : kept;
 }
 
 }  // namespace bslam::estimators

@@ -14,12 +14,15 @@ struct PairRotationOptions {
 
 struct PairRotation {
   Eigen::Matrix3d correction = Eigen::Matrix3d::Identity();  // R_b_a = correction * R_b_a as given, t_b_a likewise
-  // Matches that agree without and with the correction: on the epipolar plane, and in front of both cameras or too far
-  // away to have a depth. `with_depth`: those of the latter that are not too far away.
-  int agreed = 0, agree = 0, with_depth = 0;
+  // Matches that agree with the correction: on the epipolar plane, and in front of both cameras or too far away to have
+  // a depth. `with_depth`: those of the latter that are not too far away.
+  int agree = 0, with_depth = 0;
   // The correction includes a rotation that brings matches in front of the cameras: between 5 % and 85 % of those on
   // their epipolar planes were behind them.
   bool brought_to_front = false;
+  // Of camera b, relative: its focal length is (1 + focal_error) times the given one. It is not part of `correction`,
+  // and the counts are those without it.
+  double focal_error = 0.0;
 };
 
 // Matches that agree with a relative pose, as in PairRotation.

@@ -16,6 +16,7 @@ tracking::TrackerOptions tracker_options(const Config& config, CamerasOfRun came
           .seed = static_cast<std::uint64_t>(config.seed),
           .localize_only = config.localize_only,
           .correct_rig = config.calibration.refine != calibration::Refine::kFalse,
+          .sigma_focal = 0.01 * config.calibration.sigma_focal_percent,
           .first_camera = cameras.first,
           .num_cameras = cameras.size,
           .new_submap_after = config.looping.recovery.new_submap_after,

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "camera/model_parameters.h"
 #include "estimators/pair_rotation.h"
 #include "feature/descriptor_matching.h"
 #include "frame/capture_times.h"
@@ -18,8 +19,9 @@ constexpr int kMinWithDepth = 25;     // minimum number of these that are in fro
 constexpr double kClearly = 1.5;      // minimum factor by which the correction increases their number
 constexpr double kSome = 1.04;        // the same, if it brings matches in front of the cameras
 constexpr double kTolerancePx = 2.0;
-constexpr double kMaxAngle = 0.1;      // rad; a larger one is another arrangement of the cameras
-constexpr double kMinBaseline = 1e-3;  // m
+constexpr double kMaxAngle = 0.1;        // rad; a larger one is another arrangement of the cameras
+constexpr double kMinBaseline = 1e-3;    // m
+constexpr double kMaxSigmaFocal = 0.02;  // relative; focal lengths that are known better are not corrected
 
 using estimators::bearing_pairs;
 using estimators::PixelPair;
@@ -47,34 +49,85 @@ bool other_mistake(const camera::Camera& of_i, const camera::Camera& of_j, const
          estimators::epipolar_agreement(pose, bearing_pairs(matches, of_i, of_j), tolerance).all > needed;
 }
 
-// T_j_i with the rotation of camera j that agrees with most matches: as given, or corrected; nullopt if none does.
-std::optional<geometry::SE3> agreeing_pose(const camera::Rig& rig, std::size_t i, std::size_t j,
-                                           const geometry::SE3& T_j_i, const frame::BundledFrame& frame) {
-  const frame::CameraFrame &a = frame.cameras[i], &b = frame.cameras[j];
+struct Pair {
+  const camera::RigCamera& i;
+  camera::RigCamera j;
+};
+
+geometry::SE3 relative_pose(const Pair& pair) { return pair.j.T_body_cam.inverse() * pair.i.T_body_cam; }
+
+camera::Camera with_focal_factor(camera::Camera camera, double factor) {
+  camera::ModelParameters parameters = camera::parameters(camera.model);
+  parameters.head<2>() *= factor;
+  camera.model = camera::with_parameters(camera.model, parameters);
+  return camera;
+}
+
+double tolerance_of(const Pair& pair) {
+  return kTolerancePx * std::max(pair.i.camera.radians_per_pixel(), pair.j.camera.radians_per_pixel());
+}
+
+// Camera j with the focal length, relative to that of camera i, with which most matches are on their epipolar planes.
+camera::Camera with_focal_of_pair(const Pair& pair, double sigma_focal, std::span<const PixelPair> matches) {
+  constexpr int kSteps = 6;            // to either side
+  constexpr double kDeviations = 2.0;  // the farthest
+  constexpr int kRefinements = 2;      // of the best step
+  const geometry::SE3 T_j_i = relative_pose(pair);
+  const estimators::EpipolarPose pose{T_j_i.matrix3(), T_j_i.translation().normalized()};
+  const auto found_with = [&](double log_factor) {
+    const camera::Camera camera = with_focal_factor(pair.j.camera, std::exp(log_factor));
+    return estimators::pair_rotation(pose, bearing_pairs(matches, pair.i.camera, camera),
+                                     {.tolerance = tolerance_of(pair)});
+  };
+  double best = 0.0;
+  estimators::PairRotation found = found_with(best);
+  const auto consider = [&](double log_factor) {
+    const estimators::PairRotation other = found_with(log_factor);
+    if (other.agree <= found.agree) return;
+    found = other;
+    best = log_factor;
+  };
+  for (int step = 1; step <= kSteps; ++step) {
+    for (const double sign : {-1.0, 1.0}) consider(sign * kDeviations * std::sqrt(2.0) * sigma_focal * step / kSteps);
+  }
+  for (int i = 0; i < kRefinements; ++i) consider(best + found.focal_error);
+  return with_focal_factor(pair.j.camera, std::exp(best));
+}
+
+// Camera j of a pair as most matches show it: as given, or corrected; nullopt if they do not show it.
+std::optional<camera::RigCamera> agreeing_camera(const Pair& pair, double sigma_focal, const frame::CameraFrame& a,
+                                                 const frame::CameraFrame& b) {
   if (std::min(a.keypoints.size(), b.keypoints.size()) < kMinMatches) return std::nullopt;
+  const geometry::SE3 T_j_i = relative_pose(pair);
   if (std::abs(a.time_ns - b.time_ns) > frame::kTogetherNs || T_j_i.translation().norm() < kMinBaseline)
     return std::nullopt;
   const std::vector<PixelPair> matches = matches_of(a, b);
   if (matches.size() < kMinMatches) return std::nullopt;
-  const double tolerance =
-      kTolerancePx * std::max(rig.camera(i).radians_per_pixel(), rig.camera(j).radians_per_pixel());
+  const double tolerance = tolerance_of(pair);
+  camera::RigCamera corrected = pair.j;
+  if (sigma_focal > kMaxSigmaFocal) corrected.camera = with_focal_of_pair(pair, sigma_focal, matches);
   // Either camera may be the one that is rotated about its own centre.
   const geometry::SE3 T_i_j = T_j_i.inverse();
   const auto rotation = [&](const geometry::SE3& T, const std::vector<estimators::BearingPair>& pairs) {
     return estimators::pair_rotation({T.matrix3(), T.translation().normalized()}, pairs, {.tolerance = tolerance});
   };
-  const std::vector<estimators::BearingPair> pairs = bearing_pairs(matches, rig.camera(i), rig.camera(j));
+  const std::vector<estimators::BearingPair> pairs = bearing_pairs(matches, pair.i.camera, corrected.camera);
   std::vector<estimators::BearingPair> swapped = pairs;
-  for (estimators::BearingPair& pair : swapped) std::swap(pair.a, pair.b);
+  for (estimators::BearingPair& match : swapped) std::swap(match.a, match.b);
   const estimators::PairRotation of_j = rotation(T_j_i, pairs), of_i = rotation(T_i_j, swapped);
   const bool second = of_j.agree >= of_i.agree;
   const estimators::PairRotation& found = second ? of_j : of_i;
+  const int agreed = estimators::epipolar_agreement({T_j_i.matrix3(), T_j_i.translation().normalized()},
+                                                    bearing_pairs(matches, pair.i.camera, pair.j.camera), tolerance)
+                         .all;
   if (found.agree < kMinAgreeing * static_cast<double>(matches.size())) return std::nullopt;
-  if (found.agree < (found.brought_to_front ? kSome : kClearly) * found.agreed) return T_j_i;
-  if (found.with_depth < kMinWithDepth || other_mistake(rig.camera(i), rig.camera(j), T_j_i, matches, tolerance))
+  if (found.agree < (found.brought_to_front ? kSome : kClearly) * agreed) return pair.j;
+  if (found.with_depth < kMinWithDepth || other_mistake(pair.i.camera, corrected.camera, T_j_i, matches, tolerance))
     return std::nullopt;
   const geometry::SE3 correction(Eigen::Quaterniond(found.correction), Eigen::Vector3d::Zero());
-  return second ? correction * T_j_i : (correction * T_i_j).inverse();
+  const geometry::SE3 T = second ? correction * T_j_i : (correction * T_i_j).inverse();
+  corrected.T_body_cam = pair.i.T_body_cam * T.inverse();
+  return corrected;
 }
 
 // Returns true if some camera is rotated too far for a camera that was bumped: the arrangement of the cameras is
@@ -89,19 +142,21 @@ bool rearranged(const camera::Rig& rig, const camera::Rig& given) {
 
 }  // namespace
 
-std::optional<camera::Rig> with_corrected_rotations(const camera::Rig& rig, const camera::Rig& given,
-                                                    const frame::BundledFrame& frame) {
+std::optional<camera::Rig> with_corrected_pairs(const camera::Rig& rig, const camera::Rig& given, double sigma_focal,
+                                                const frame::BundledFrame& frame) {
   std::vector<camera::RigCamera> cameras;
   for (std::size_t c = 0; c < rig.size(); ++c) cameras.push_back({rig.camera(c), rig.body_from_cam(c)});
   bool any = false;
   for (std::size_t j = 1; j < rig.size(); ++j) {
     for (std::size_t i = 0; i < j; ++i) {
       if (!rig.share_view(i, j)) continue;
-      const geometry::SE3 T_j_i = rig.cam_from_rig(j) * rig.rig_from_cam(i);
-      const auto agreeing = agreeing_pose(rig, i, j, T_j_i, frame);
+      // The pose of camera j relative to camera i as given, which may have been corrected.
+      const geometry::SE3 T_i_j = rig.cam_from_rig(i) * rig.rig_from_cam(j);
+      const camera::RigCamera as_given{rig.camera(j), cameras[i].T_body_cam * T_i_j};
+      auto agreeing = agreeing_camera({cameras[i], as_given}, sigma_focal, frame.cameras[i], frame.cameras[j]);
       if (!agreeing) continue;
-      any |= !(agreeing->rotation().coeffs() == T_j_i.rotation().coeffs());
-      cameras[j].T_body_cam = cameras[i].T_body_cam * agreeing->inverse();
+      any |= agreeing->T_body_cam.rotation().coeffs() != as_given.T_body_cam.rotation().coeffs();
+      cameras[j] = *std::move(agreeing);
       break;
     }
   }

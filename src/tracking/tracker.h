@@ -28,7 +28,8 @@ struct TrackerOptions {
   feature::FeatureOptions features;
   std::uint64_t seed = 1;
   bool localize_only = false;  // never propose an edit of the map
-  bool correct_rig = true;     // correct rotations of the rig before a map is started (tracking/start_correction.h)
+  bool correct_rig = true;     // correct the rig before a map is started (tracking/start_correction.h)
+  double sigma_focal = 0.0;    // relative standard deviation of its focal lengths
   // First and number of the cameras that belong to the run; number 0: all. The others belong to other rigs of the map
   // and never have images.
   std::size_t first_camera = 0, num_cameras = 0;

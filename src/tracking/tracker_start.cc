@@ -125,7 +125,7 @@ bool Tracker::correct_rig(const Input& input, TrackOutcome& outcome) const {
   FrontEndState& state = outcome.next;
   if (!options_.correct_rig || input.map->num_keyframes() > 0 || !rig_.any_overlap()) return false;
   if (state.rig_corrections >= kMaxCorrections || state.rig_checks++ % kCheckInterval != 0) return false;
-  auto corrected = with_corrected_rotations(input.map->rig(), rig_, input.frame);
+  auto corrected = with_corrected_pairs(input.map->rig(), rig_, options_.sigma_focal, input.frame);
   if (!corrected) return false;
   ++state.rig_corrections;
   map::MapDraft draft(input.map);
