@@ -4,13 +4,15 @@
 
 namespace bslam::looping {
 std::optional<PlaceMatch> relocalise(PlaceRecogniser& recogniser, const map::BundledMap& map,
-                                     const frame::BundledFrame& frame, const VerificationOptions& options,
-                                     const feature::FeatureModel& features, Random random) {
+                                     const frame::BundledFrame& frame,
+                                     const std::function<bool(const PlaceMatch&)>& plausible,
+                                     const VerificationOptions& options, const feature::FeatureModel& features,
+                                     Random random) {
   std::vector<PlaceMatch> found;
   const camera::Rig rig = frame::rig_of(map.rig(), frame);
   for (const PlaceCandidate& candidate : recogniser.query_frame(map, frame)) {
-    if (auto place_match = verify_place(map, rig, frame, candidate.keyframe, options, features, random))
-      found.push_back(std::move(*place_match));
+    auto place_match = verify_place(map, rig, frame, candidate.keyframe, options, features, random);
+    if (place_match && plausible(*place_match)) found.push_back(std::move(*place_match));
   }
   if (found.empty()) return std::nullopt;
   // On ties the first one is used, which has the higher appearance score.

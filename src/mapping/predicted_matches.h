@@ -5,10 +5,11 @@
 
 namespace bslam::mapping {
 
-// Divides each point into one point for each group of cameras that are connected by matched features, which are
-// observations of a point by several cameras at one pose. A landmark without such a connection was found in another
-// camera at the place where the scale of the map predicted it: whatever was found there confirms this scale, right or
-// wrong. Points that are left with one observation are removed.
+// Divides each point into one point for each group of cameras that are connected by observations of it at one pose. A
+// landmark that no other camera observed at the same time was found in another one later, at the place where the scale
+// of the map predicted it: whatever was found there confirms this scale, right or wrong. At one time, matched features
+// show where a landmark is; those of tracking that were predicted as well have to satisfy the epipolar constraint, and
+// to leave them out costs more than they spoil. Points that are left with one observation are removed.
 solver::ReprojectionProblem without_predicted_matches(solver::ReprojectionProblem problem);
 
 }  // namespace bslam::mapping

@@ -14,8 +14,9 @@ class PlaceRelocaliser : public tracking::Relocaliser {
   PlaceRelocaliser(std::unique_ptr<looping::PlaceRecogniser> recogniser, const Config& config);
 
   void describe(frame::BundledFrame& frame) const override;
-  std::optional<tracking::FoundPlace> verify_place(const map::BundledMap& map,
-                                                   const frame::BundledFrame& frame) override;
+  std::optional<tracking::FoundPlace> verify_place(
+      const map::BundledMap& map, const frame::BundledFrame& frame,
+      const std::function<bool(const tracking::FoundPlace&)>& plausible) override;
   std::size_t memory_bytes() const override { return recogniser_->memory_bytes(); }
 
  private:

@@ -5,6 +5,8 @@
 #include <utility>
 
 #include "base/median.h"
+#include "map/keyframe_landmarks.h"
+#include "map/search_points.h"
 
 namespace bslam::tracking {
 
@@ -85,6 +87,24 @@ std::vector<LandmarkCounts> count_reobserved(const map::BundledMap& map, const f
       ++out[c].expected;
       out[c].found += std::binary_search(again.begin(), again.end(), l);
     }
+  }
+  return out;
+}
+
+std::vector<LandmarkCounts> count_own(const map::BundledMap& map, const frame::BundledFrame& frame,
+                                      const SE3& T_rig_world, std::span<const std::uint8_t> excluded,
+                                      std::span<const LandmarkId> landmarks,
+                                      const matching::ProjectionSearchOptions& windows) {
+  std::vector<LandmarkCounts> out(excluded.size());
+  if (std::ranges::count(excluded, std::uint8_t{0}) == static_cast<std::ptrdiff_t>(excluded.size())) return out;
+  const camera::Rig rig = frame::rig_of(map.rig(), frame);
+  for (std::size_t c = 0; c < out.size(); ++c) {
+    if (!excluded[c] || frame.cameras[c].keypoints.empty()) continue;
+    const std::vector<LandmarkId> own = map::observed_by(map, landmarks, CameraIndex(c));
+    const auto found =
+        matching::search_by_projection(rig, CameraIndex(c), frame.cameras[c], rig.cam_from_rig(c) * T_rig_world,
+                                       map::search_points(map, own), {}, windows);
+    out[c] = {static_cast<int>(found.visible.size()), static_cast<int>(found.matches.size())};
   }
   return out;
 }

@@ -44,6 +44,13 @@ std::vector<LandmarkCounts> count_reobserved(const map::BundledMap& map, const f
                                              const std::vector<CameraConsensusState>& states,
                                              const FrameMatches& found);
 
+// Per excluded camera: those of the landmarks that it has observed itself and that are predicted in its image, and how
+// many of them are found in it. Zero for the other cameras, and for those without keypoints.
+std::vector<LandmarkCounts> count_own(const map::BundledMap& map, const frame::BundledFrame& frame,
+                                      const geometry::SE3& T_rig_world, std::span<const std::uint8_t> excluded,
+                                      std::span<const LandmarkId> landmarks,
+                                      const matching::ProjectionSearchOptions& windows);
+
 // Per camera: the number of matches that are used to judge whether the camera agrees with a pose, and how many of them
 // are inliers. `inlier`: one flag per match, in order. A landmark that is also an outlier in a camera without conflict
 // has probably moved; it is not counted in cameras with few inliers.

@@ -49,14 +49,16 @@ solver::MotionModel motion_model(const TrackInput& input, const frame::BundledFr
 
 bool is_plausible(const FoundPlace& place, const map::BundledMap& map, const TrackerState& state, TimeNs time_ns) {
   constexpr double kSpeeds = 2.0, kClearlyFound = 0.4;
+  constexpr double kForgotten_s = 5.0;  // the rig may have been anywhere since
   const std::optional<SE3> T_rig_world = state.anchored.resolve(map);
-  if (!T_rig_world || !state.twist || place.found_ratio >= kClearlyFound ||
+  const double time_s = to_seconds(time_ns - state.time_ns);
+  if (!T_rig_world || !state.twist || time_s > kForgotten_s || place.found_ratio >= kClearlyFound ||
       map.root_of(map.nearest_alive_ancestor(state.anchored.reference)) != map.root_of(place.matched_keyframe))
     return true;
   std::vector<double> distances;
   for (const auto& [feature, l] : place.matches)
     distances.push_back((place.T_rig_world * map.landmark(l).position).norm());
-  const double travelled = kSpeeds * state.twist->tail<3>().norm() * to_seconds(time_ns - state.time_ns);
+  const double travelled = kSpeeds * state.twist->tail<3>().norm() * time_s;
   const double distance = (T_rig_world->inverse().translation() - place.T_rig_world.inverse().translation()).norm();
   return distance <= travelled + (distances.empty() ? 0.0 : median(distances));
 }

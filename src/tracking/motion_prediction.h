@@ -21,9 +21,10 @@ geometry::SE3 last_pose(const TrackInput& input);
 // The last pose, advanced by the motion model if the motion is known.
 geometry::SE3 predict(const TrackInput& input, TimeNs time_ns);
 
-// Returns true if the rig can have come from its last pose to the place by `time_ns`, at twice its last speed or by the
-// median distance of the landmarks matched there, or if these are so many that it must have been carried there:
-// repeated structures match a part of a place that is elsewhere.
+// Returns true if the rig can have come from its last pose to the place by `time_ns`: within the median distance of the
+// landmarks matched there plus the way at twice its last speed. Returns true as well some seconds after the last pose,
+// and if 40 % of the landmarks predicted at the place are found: it must have been carried there. Repeated structures
+// match a smaller part of a place that is elsewhere.
 bool is_plausible(const FoundPlace& place, const map::BundledMap& map, const TrackerState& state, TimeNs time_ns);
 
 // Median distance, in pixels, by which the landmarks of the last frame moved in the images between the two frames from

@@ -1,6 +1,7 @@
 // Interface through which tracking uses place recognition, which belongs to a higher layer, to relocalise a lost rig.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -25,8 +26,9 @@ class Relocaliser {
   // Prepares a frame for relocalisation or for becoming a keyframe. Does nothing if the frame is already prepared.
   virtual void describe(frame::BundledFrame& frame) const = 0;
 
-  // Searches the whole map for the pose of a described frame. Returns nullopt if no place is confirmed.
-  virtual std::optional<FoundPlace> verify_place(const map::BundledMap& map, const frame::BundledFrame& frame) = 0;
+  // Searches the whole map for the pose of a described frame. Returns nullopt if no plausible place is confirmed.
+  virtual std::optional<FoundPlace> verify_place(const map::BundledMap& map, const frame::BundledFrame& frame,
+                                                 const std::function<bool(const FoundPlace&)>& plausible) = 0;
 
   // Memory of its index of places, in bytes.
   virtual std::size_t memory_bytes() const { return 0; }

@@ -19,9 +19,9 @@ constexpr int kMinWithDepth = 25;     // minimum number of these that are in fro
 constexpr double kClearly = 1.5;      // minimum factor by which the correction increases their number
 constexpr double kSome = 1.04;        // the same, if it brings matches in front of the cameras
 constexpr double kTolerancePx = 2.0;
-constexpr double kMaxAngle = 0.1;        // rad; a larger one is another arrangement of the cameras
-constexpr double kMinBaseline = 1e-3;    // m
-constexpr double kMaxSigmaFocal = 0.02;  // relative; focal lengths that are known better are not corrected
+constexpr double kMaxAngle = 0.1;      // rad; a larger one is another arrangement of the cameras
+constexpr double kMinBaseline = 1e-3;  // m
+constexpr double kKnownFocal = 0.02;   // relative standard deviation of focal lengths that are not corrected
 
 using estimators::bearing_pairs;
 using estimators::PixelPair;
@@ -50,11 +50,18 @@ bool other_mistake(const camera::Camera& of_i, const camera::Camera& of_j, const
 }
 
 struct Pair {
-  const camera::RigCamera& i;
-  camera::RigCamera j;
+  camera::RigCamera i, j;
 };
 
 geometry::SE3 relative_pose(const Pair& pair) { return pair.j.T_body_cam.inverse() * pair.i.T_body_cam; }
+
+estimators::EpipolarPose epipolar_pose(const geometry::SE3& T_b_a) {
+  return {T_b_a.matrix3(), T_b_a.translation().normalized()};
+}
+
+double tolerance_of(const Pair& pair) {
+  return kTolerancePx * std::max(pair.i.camera.radians_per_pixel(), pair.j.camera.radians_per_pixel());
+}
 
 camera::Camera with_focal_factor(camera::Camera camera, double factor) {
   camera::ModelParameters parameters = camera::parameters(camera.model);
@@ -63,35 +70,37 @@ camera::Camera with_focal_factor(camera::Camera camera, double factor) {
   return camera;
 }
 
-double tolerance_of(const Pair& pair) {
-  return kTolerancePx * std::max(pair.i.camera.radians_per_pixel(), pair.j.camera.radians_per_pixel());
+bool has_other_focal(const camera::Camera& a, const camera::Camera& b) {
+  return camera::parameters(a.model)(0) != camera::parameters(b.model)(0);
 }
 
-// Camera j with the focal length, relative to that of camera i, with which most matches are on their epipolar planes.
+// Camera j with the focal length, relative to that of camera i, with which clearly more matches are on their epipolar
+// planes, or as given if there is none.
 camera::Camera with_focal_of_pair(const Pair& pair, double sigma_focal, std::span<const PixelPair> matches) {
-  constexpr int kSteps = 6;            // to either side
-  constexpr double kDeviations = 2.0;  // the farthest
-  constexpr int kRefinements = 2;      // of the best step
-  const geometry::SE3 T_j_i = relative_pose(pair);
-  const estimators::EpipolarPose pose{T_j_i.matrix3(), T_j_i.translation().normalized()};
+  constexpr double kStep = 0.05;         // of the logarithm
+  constexpr double kDeviations = 2.0;    // the farthest
+  constexpr double kClearlyMore = 1.15;  // factor of the number of matches
+  const estimators::EpipolarPose pose = epipolar_pose(relative_pose(pair));
   const auto found_with = [&](double log_factor) {
     const camera::Camera camera = with_focal_factor(pair.j.camera, std::exp(log_factor));
     return estimators::pair_rotation(pose, bearing_pairs(matches, pair.i.camera, camera),
                                      {.tolerance = tolerance_of(pair)});
   };
+  const estimators::PairRotation as_given = found_with(0.0);
+  estimators::PairRotation found = as_given;
   double best = 0.0;
-  estimators::PairRotation found = found_with(best);
   const auto consider = [&](double log_factor) {
     const estimators::PairRotation other = found_with(log_factor);
     if (other.agree <= found.agree) return;
     found = other;
     best = log_factor;
   };
-  for (int step = 1; step <= kSteps; ++step) {
-    for (const double sign : {-1.0, 1.0}) consider(sign * kDeviations * std::sqrt(2.0) * sigma_focal * step / kSteps);
+  const double farthest = kDeviations * std::sqrt(2.0) * sigma_focal;  // of the ratio
+  for (double step = kStep; step <= farthest; step += kStep) {
+    for (const double sign : {-1.0, 1.0}) consider(sign * step);
   }
-  for (int i = 0; i < kRefinements; ++i) consider(best + found.focal_error);
-  return with_focal_factor(pair.j.camera, std::exp(best));
+  consider(best + found.focal_error);
+  return found.agree > kClearlyMore * as_given.agree ? with_focal_factor(pair.j.camera, std::exp(best)) : pair.j.camera;
 }
 
 // Camera j of a pair as most matches show it: as given, or corrected; nullopt if they do not show it.
@@ -105,11 +114,12 @@ std::optional<camera::RigCamera> agreeing_camera(const Pair& pair, double sigma_
   if (matches.size() < kMinMatches) return std::nullopt;
   const double tolerance = tolerance_of(pair);
   camera::RigCamera corrected = pair.j;
-  if (sigma_focal > kMaxSigmaFocal) corrected.camera = with_focal_of_pair(pair, sigma_focal, matches);
+  if (sigma_focal > kKnownFocal) corrected.camera = with_focal_of_pair(pair, sigma_focal, matches);
+  const bool other_focal = has_other_focal(corrected.camera, pair.j.camera);
   // Either camera may be the one that is rotated about its own centre.
   const geometry::SE3 T_i_j = T_j_i.inverse();
   const auto rotation = [&](const geometry::SE3& T, const std::vector<estimators::BearingPair>& pairs) {
-    return estimators::pair_rotation({T.matrix3(), T.translation().normalized()}, pairs, {.tolerance = tolerance});
+    return estimators::pair_rotation(epipolar_pose(T), pairs, {.tolerance = tolerance});
   };
   const std::vector<estimators::BearingPair> pairs = bearing_pairs(matches, pair.i.camera, corrected.camera);
   std::vector<estimators::BearingPair> swapped = pairs;
@@ -117,11 +127,11 @@ std::optional<camera::RigCamera> agreeing_camera(const Pair& pair, double sigma_
   const estimators::PairRotation of_j = rotation(T_j_i, pairs), of_i = rotation(T_i_j, swapped);
   const bool second = of_j.agree >= of_i.agree;
   const estimators::PairRotation& found = second ? of_j : of_i;
-  const int agreed = estimators::epipolar_agreement({T_j_i.matrix3(), T_j_i.translation().normalized()},
-                                                    bearing_pairs(matches, pair.i.camera, pair.j.camera), tolerance)
-                         .all;
+  const auto as_given = bearing_pairs(matches, pair.i.camera, pair.j.camera);
+  const int agreed = estimators::epipolar_agreement(epipolar_pose(T_j_i), as_given, tolerance).all;
   if (found.agree < kMinAgreeing * static_cast<double>(matches.size())) return std::nullopt;
-  if (found.agree < (found.brought_to_front ? kSome : kClearly) * agreed) return pair.j;
+  const bool some_suffice = found.brought_to_front && !other_focal;
+  if (found.agree < (some_suffice ? kSome : kClearly) * agreed) return pair.j;
   if (found.with_depth < kMinWithDepth || other_mistake(pair.i.camera, corrected.camera, T_j_i, matches, tolerance))
     return std::nullopt;
   const geometry::SE3 correction(Eigen::Quaterniond(found.correction), Eigen::Vector3d::Zero());
@@ -153,7 +163,9 @@ std::optional<camera::Rig> with_corrected_pairs(const camera::Rig& rig, const ca
       // The pose of camera j relative to camera i as given, which may have been corrected.
       const geometry::SE3 T_i_j = rig.cam_from_rig(i) * rig.rig_from_cam(j);
       const camera::RigCamera as_given{rig.camera(j), cameras[i].T_body_cam * T_i_j};
-      auto agreeing = agreeing_camera({cameras[i], as_given}, sigma_focal, frame.cameras[i], frame.cameras[j]);
+      // A focal length is corrected once.
+      const double sigma = has_other_focal(rig.camera(j), given.camera(j)) ? 0.0 : sigma_focal;
+      auto agreeing = agreeing_camera({cameras[i], as_given}, sigma, frame.cameras[i], frame.cameras[j]);
       if (!agreeing) continue;
       any |= agreeing->T_body_cam.rotation().coeffs() != as_given.T_body_cam.rotation().coeffs();
       cameras[j] = *std::move(agreeing);

@@ -14,7 +14,8 @@ namespace bslam::tracking {
 // relative standard deviation of the focal lengths, is larger than 2 %, the focal lengths of these cameras are
 // corrected as well, relative to those of the earlier ones. Returns nullopt unless the correction of some camera makes
 // clearly more matches agree, or several that are behind the cameras as given, and most of them. Takes some 5 ms per
-// pair. `given`: the rig before any correction, from which no camera is rotated by more than some degrees.
+// pair, 50 ms if focal lengths are corrected. `given`: the rig before any correction, from which no camera is rotated
+// by more than some degrees.
 std::optional<camera::Rig> with_corrected_pairs(const camera::Rig& rig, const camera::Rig& given, double sigma_focal,
                                                 const frame::BundledFrame& frame);
 

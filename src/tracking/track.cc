@@ -5,7 +5,6 @@
 #include <numeric>
 
 #include "frame/rig_at.h"
-#include "map/keyframe_landmarks.h"
 #include "tracking/keyframe_decision.h"
 #include "tracking/motion_prediction.h"
 #include "tracking/robust_pose.h"
@@ -237,19 +236,6 @@ std::vector<LandmarkCounts> landmark_counts(const MatchSearch& search) {
   return out;
 }
 
-// See Fine::own.
-std::vector<LandmarkCounts> own_landmark_counts(const TrackInput& input, const Coarse& coarse,
-                                                std::span<const LandmarkId> landmarks,
-                                                const matching::ProjectionSearchOptions& windows, ThreadPool& pool) {
-  std::vector<LandmarkCounts> out(coarse.excluded.size());
-  for (std::size_t c = 0; c < out.size(); ++c) {
-    if (!coarse.excluded[c]) continue;
-    const std::vector<LandmarkId> own = map::observed_by(input.map, landmarks, CameraIndex(c));
-    out[c] = landmark_counts(find_landmarks(input.map, coarse.frame, coarse.T_rig_world, own, {}, windows, pool))[c];
-  }
-  return out;
-}
-
 // Pose from all landmarks of the local view, with keypoints aligned to their landmarks' patches.
 Fine track_local_view(const TrackInput& input, const Coarse& coarse, const TrackingOptions& options, ThreadPool& pool) {
   const map::BundledMap& map = input.map;
@@ -262,7 +248,7 @@ Fine track_local_view(const TrackInput& input, const Coarse& coarse, const Track
   MatchSearch search = find_landmarks(map, frame, coarse.T_rig_world, near, coarse.matches, narrow, pool);
   Fine out;
   out.views = landmark_counts(search);
-  out.own = own_landmark_counts(input, coarse, near, narrow, pool);
+  out.own = count_own(map, frame, coarse.T_rig_world, coarse.excluded, near, narrow);
   if (any_due_for_retry(input.state, frame.time_ns, options.consensus)) {
     auto windows = search_options(input, options.matching, options.matching.wide_radius);
     windows.ratio = 0.8 * options.matching.ratio;

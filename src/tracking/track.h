@@ -89,9 +89,10 @@ struct DirectState {
 // State of tracking that is carried from frame to frame.
 struct TrackerState {
   TrackStatus status = TrackStatus::kNotStarted;
-  TimeNs time_ns = 0;                         // time of the last tracked frame
-  map::AnchoredPose anchored;                 // pose of the last tracked frame
-  std::optional<geometry::Vector6d> twist;    // T_rig_world(t + dt) = exp(dt twist) T_rig_world(t); rad/s, map units/s
+  TimeNs time_ns = 0;          // time of the last tracked frame
+  map::AnchoredPose anchored;  // pose of the last tracked frame
+  // Of the last tracked frame: T_rig_world(t + dt) = exp(dt twist) T_rig_world(t); rad/s, map units/s.
+  std::optional<geometry::Vector6d> twist;
   double twist_interval_s = 0;                // time between the two frames from which the twist was computed
   bool twist_kept = false;                    // it is that of the frame before, which was too shortly before
   std::vector<LandmarkId> landmarks;          // inliers of the last tracked frame

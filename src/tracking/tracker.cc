@@ -340,9 +340,12 @@ bool Tracker::relocalise(Input& input, TrackOutcome& outcome) {
   if (!relocaliser_) return false;
   const Stopwatch watch;
   relocaliser_->describe(input.frame);
-  const std::optional<FoundPlace> place = relocaliser_->verify_place(*input.map, input.frame);
+  const auto plausible = [&](const FoundPlace& place) {
+    return is_plausible(place, *input.map, outcome.next.track, input.frame.time_ns);
+  };
+  const std::optional<FoundPlace> place = relocaliser_->verify_place(*input.map, input.frame, plausible);
   outcome.record.stages.push_back({"relocalise", watch.ms()});
-  if (!place || !is_plausible(*place, *input.map, outcome.next.track, input.frame.time_ns)) return false;
+  if (!place) return false;
   std::vector<LandmarkId> landmarks;
   std::vector<int> seen(rig_.size(), 0);
   for (const auto& [feature, l] : place->matches) {

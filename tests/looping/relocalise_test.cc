@@ -9,7 +9,8 @@ namespace {
 
 std::optional<PlaceMatch> relocalised(PlaceRecogniser& places, const HallMap& world, const SimulatedFrame& seen,
                                       std::uint64_t seed) {
-  return relocalise(places, world.map, described(seen), {}, kFeatures, seeded(seed));
+  return relocalise(
+      places, world.map, described(seen), [](const PlaceMatch&) { return true; }, {}, kFeatures, seeded(seed));
 }
 std::optional<PlaceMatch> relocalised(const HallMap& world, const SimulatedFrame& seen) {
   return relocalised(*recogniser(), world, seen, 1);
@@ -92,6 +93,25 @@ TEST(Relocalise, RejectsAmbiguousRooms) {
       EXPECT_FALSE(relocalised(*places, world, seen, static_cast<std::uint64_t>(i)));
     }
   }
+}
+
+// Of two identical rooms, the one that the rig cannot have reached is no alternative.
+TEST(Relocalise, DistinguishesAmbiguousRoomsIfOneIsNotPlausible) {
+  const FeatureSimulator simulator = hall(rig_of(2));
+  const HallMap world = two_rooms(simulator, 0.0);
+  const auto places = recogniser();
+  int found = 0;
+  for (int i = 0; i < 10; ++i) {
+    const SimulatedFrame seen = simulator.frame(FrameId(1000 + i), 1 + 0.4 * i);
+    const auto is_here = [&](const PlaceMatch& place) { return is_true(place, seen.T_world_rig.inverse()); };
+    const auto place = relocalise(*places, world.map, described(seen), is_here, {}, kFeatures, seeded(1));
+    if (!place) continue;
+    ++found;
+    EXPECT_TRUE(is_here(*place));
+    EXPECT_GT(place->found_ratio, VerificationOptions{}.min_found_ratio);
+    EXPECT_LE(place->found_ratio, 1.0);
+  }
+  EXPECT_GE(found, 8);
 }
 
 TEST(Relocalise, DistinguishesRoomsThatDifferInHalfOfTheirLandmarks) {

@@ -61,6 +61,9 @@ TEST_F(IsPlausible, IfTheLastPoseIsUnknownOrTheEvidenceIsClear) {
   place_.found_ratio = 0.5;
   EXPECT_TRUE(at_distance(50.0));
   place_.found_ratio = 0.3;
+  place_.T_rig_world = SE3(Eigen::Quaterniond::Identity(), Vector3d(0, 50, 0)) * place_.T_rig_world;
+  EXPECT_FALSE(is_plausible(place_, world_.map, state_, from_seconds(14.9)));
+  EXPECT_TRUE(is_plausible(place_, world_.map, state_, from_seconds(15.1))) << "after a long time";
   TrackerState known = state_;
   state_.twist.reset();
   EXPECT_TRUE(at_distance(50.0));

@@ -9,15 +9,21 @@ namespace {
 
 using geometry::SE3;
 
-// A relocaliser that returns a given place.
+// A relocaliser that returns a given place, and counts how often the tracker does not find it plausible.
 class FixedPlaceRelocaliser : public Relocaliser {
  public:
-  explicit FixedPlaceRelocaliser(const std::optional<FoundPlace>& place) : place_(place) {}
+  FixedPlaceRelocaliser(const std::optional<FoundPlace>& place, int& refused) : place_(place), refused_(refused) {}
   void describe(frame::BundledFrame&) const override {}
-  std::optional<FoundPlace> verify_place(const map::BundledMap&, const frame::BundledFrame&) override { return place_; }
+  std::optional<FoundPlace> verify_place(const map::BundledMap&, const frame::BundledFrame&,
+                                         const std::function<bool(const FoundPlace&)>& plausible) override {
+    if (!place_ || plausible(*place_)) return place_;
+    ++refused_;
+    return std::nullopt;
+  }
 
  private:
   const std::optional<FoundPlace>& place_;
+  int& refused_;
 };
 
 // A tracker and its map, fed with simulated frames of the orbit.
@@ -30,7 +36,7 @@ class TrackerRun {
   TrackerRun(synthetic::FeatureSimulator simulator, const TrackerOptions& options, map::BundledMap map)
       : sim(std::move(simulator)),
         store(std::move(map)),
-        tracker(sim.rig(), options, pool_, std::make_unique<FixedPlaceRelocaliser>(place)),
+        tracker(sim.rig(), options, pool_, std::make_unique<FixedPlaceRelocaliser>(place, refused)),
         pyramids(map::flat_pyramids(sim.rig().size())) {}
 
   frame::BundledFrame frame(int i) const { return sim.frame(FrameId(i), time_s(i)).frame; }
@@ -50,6 +56,7 @@ class TrackerRun {
   synthetic::FeatureSimulator sim;
   map::MapStore store;
   std::optional<FoundPlace> place;
+  int refused = 0;
   FrontEndState state;
 
  private:
@@ -349,6 +356,23 @@ TEST(Tracker, TracksFromTheRelocalisedPlaceAfterALoss) {
   EXPECT_EQ(found.relocalisation->matched_keyframe, KeyframeId(0));
   EXPECT_LT(map::distance_m(found.T_rig_odom, T_rig_odom), 1e-9);  // the odometry pose is continuous
   EXPECT_LT(map::distance_m(found.T_rig_odom, found.result.T_rig_world * found.T_map_odom), 1e-9);
+}
+
+TEST(Tracker, RefusesAPlaceOutOfReachWithLittleEvidence) {
+  TrackerRun run(synthetic::ring_rig(2));
+  int i = 0;
+  while (i < 5) run.process(run.frame(i++));
+  while (i < 17) run.process(elsewhere(run.frame(i++)));  // longer than a motion is predicted
+  const SE3 far(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0, 0, 50));
+  const auto refused = [&](const SE3& T_rig_world, double found_ratio) {
+    run.place = FoundPlace{KeyframeId(0), T_rig_world, {}, 50, found_ratio};
+    run.refused = 0;
+    run.propose(elsewhere(run.frame(i)));
+    return run.refused;
+  };
+  EXPECT_EQ(refused(far * relative(run.sim, 0, i), 0.3), 1);
+  EXPECT_EQ(refused(far * relative(run.sim, 0, i), 0.5), 0);
+  EXPECT_EQ(refused(relative(run.sim, 0, i), 0.3), 0);
 }
 
 TEST(Tracker, StartsANewSubmapIfItStaysLost) {
