@@ -74,8 +74,10 @@ std::optional<RigScale> estimate_scale(const adjustment::BundleProblem& selected
                                     .correlated_observations = options.correlated_observations};
   const auto all = rig_scale(selected.problem, rig_options);
   if (all && contradicts(*all, map, selected.keyframes.size(), options)) return all;
-  const auto divided = without_predicted_matches(selected.problem);
-  if (divided.points.size() == selected.problem.points.size()) return all;  // there are none
+  const solver::ReprojectionProblem divided = without_predicted_matches(selected.problem);
+  if (divided.points.size() == selected.problem.points.size() &&
+      divided.observations.size() == selected.problem.observations.size())
+    return all;  // there are none
   const auto independent = rig_scale(divided, rig_options);
   if (!all || !independent || independent->deviation > kMaxIndependentDeviation) return independent;
   const bool agree = std::abs(std::log(all->scale / independent->scale)) <= independent->deviation;
