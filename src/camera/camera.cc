@@ -1,6 +1,7 @@
 #include "camera/camera.h"
 
 #include "base/assert.h"
+#include "camera/model_parameters.h"
 
 namespace bslam::camera {
 
@@ -22,6 +23,13 @@ double Camera::radians_per_pixel() const {
   const auto axis = project_with_jacobian(Vector3d::UnitZ());
   BSLAM_ASSERT(axis, "the optical axis must be in the domain of the model");
   return 2.0 / (axis->jacobian(0, 0) + axis->jacobian(1, 1));
+}
+
+Camera zoomed(Camera camera, double factor) {
+  ModelParameters p = parameters(camera.model);
+  p.head<2>() *= factor;
+  camera.model = with_parameters(camera.model, p);
+  return camera;
 }
 
 }  // namespace bslam::camera

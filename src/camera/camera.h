@@ -37,4 +37,7 @@ struct Camera {
   double radians_per_pixel() const;
 };
 
+// The camera with focal lengths that are longer by this factor.
+Camera zoomed(Camera camera, double factor);
+
 }  // namespace bslam::camera

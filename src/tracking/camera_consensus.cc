@@ -96,7 +96,7 @@ std::vector<LandmarkCounts> count_own(const map::BundledMap& map, const frame::B
                                       std::span<const LandmarkId> landmarks,
                                       const matching::ProjectionSearchOptions& windows) {
   std::vector<LandmarkCounts> out(excluded.size());
-  if (std::ranges::count(excluded, std::uint8_t{0}) == static_cast<std::ptrdiff_t>(excluded.size())) return out;
+  if (std::ranges::find(excluded, std::uint8_t{1}) == excluded.end()) return out;
   const camera::Rig rig = frame::rig_of(map.rig(), frame);
   for (std::size_t c = 0; c < out.size(); ++c) {
     if (!excluded[c] || frame.cameras[c].keypoints.empty()) continue;

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "camera/model_parameters.h"
 #include "estimators/pair_rotation.h"
 #include "feature/descriptor_matching.h"
 #include "frame/capture_times.h"
@@ -35,6 +34,10 @@ std::vector<PixelPair> matches_of(const frame::CameraFrame& a, const frame::Came
   return out;
 }
 
+estimators::EpipolarPose epipolar_pose(const geometry::SE3& T_b_a) {
+  return {T_b_a.matrix3(), T_b_a.translation().normalized()};
+}
+
 // Returns true if most matches are explained by identical images of both cameras, by exchanged cameras, or by an
 // inverted transform. A small corrected rotation must not hide such mistakes.
 bool other_mistake(const camera::Camera& of_i, const camera::Camera& of_j, const geometry::SE3& T_j_i,
@@ -42,8 +45,7 @@ bool other_mistake(const camera::Camera& of_i, const camera::Camera& of_j, const
   constexpr double kSamePx = 0.5;
   const auto needed = static_cast<int>(kMinAgreeing * static_cast<double>(matches.size()));
   const auto same = std::ranges::count_if(matches, [](const PixelPair& m) { return (m.a - m.b).norm() < kSamePx; });
-  const geometry::SE3 inverse = T_j_i.inverse();
-  const estimators::EpipolarPose pose{inverse.matrix3(), inverse.translation().normalized()};
+  const estimators::EpipolarPose pose = epipolar_pose(T_j_i.inverse());
   return same > needed ||
          estimators::epipolar_agreement(pose, bearing_pairs(matches, of_j, of_i), tolerance).all > needed ||
          estimators::epipolar_agreement(pose, bearing_pairs(matches, of_i, of_j), tolerance).all > needed;
@@ -55,23 +57,12 @@ struct Pair {
 
 geometry::SE3 relative_pose(const Pair& pair) { return pair.j.T_body_cam.inverse() * pair.i.T_body_cam; }
 
-estimators::EpipolarPose epipolar_pose(const geometry::SE3& T_b_a) {
-  return {T_b_a.matrix3(), T_b_a.translation().normalized()};
-}
-
 double tolerance_of(const Pair& pair) {
   return kTolerancePx * std::max(pair.i.camera.radians_per_pixel(), pair.j.camera.radians_per_pixel());
 }
 
-camera::Camera with_focal_factor(camera::Camera camera, double factor) {
-  camera::ModelParameters parameters = camera::parameters(camera.model);
-  parameters.head<2>() *= factor;
-  camera.model = camera::with_parameters(camera.model, parameters);
-  return camera;
-}
-
 bool has_other_focal(const camera::Camera& a, const camera::Camera& b) {
-  return camera::parameters(a.model)(0) != camera::parameters(b.model)(0);
+  return camera::intrinsics(a.model).fx != camera::intrinsics(b.model).fx;
 }
 
 // Camera j with the focal length, relative to that of camera i, with which clearly more matches are on their epipolar
@@ -82,7 +73,7 @@ camera::Camera with_focal_of_pair(const Pair& pair, double sigma_focal, std::spa
   constexpr double kClearlyMore = 1.15;  // factor of the number of matches
   const estimators::EpipolarPose pose = epipolar_pose(relative_pose(pair));
   const auto found_with = [&](double log_factor) {
-    const camera::Camera camera = with_focal_factor(pair.j.camera, std::exp(log_factor));
+    const camera::Camera camera = camera::zoomed(pair.j.camera, std::exp(log_factor));
     return estimators::pair_rotation(pose, bearing_pairs(matches, pair.i.camera, camera),
                                      {.tolerance = tolerance_of(pair)});
   };
@@ -100,7 +91,7 @@ camera::Camera with_focal_of_pair(const Pair& pair, double sigma_focal, std::spa
     for (const double sign : {-1.0, 1.0}) consider(sign * step);
   }
   consider(best + found.focal_error);
-  return found.agree > kClearlyMore * as_given.agree ? with_focal_factor(pair.j.camera, std::exp(best)) : pair.j.camera;
+  return found.agree > kClearlyMore * as_given.agree ? camera::zoomed(pair.j.camera, std::exp(best)) : pair.j.camera;
 }
 
 // Camera j of a pair as most matches show it: as given, or corrected; nullopt if they do not show it.

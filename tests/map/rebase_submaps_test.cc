@@ -1,7 +1,6 @@
 // The rebase rules for submaps, their scale, and the rig.
 #include <gtest/gtest.h>
 
-#include "camera/focal_lengths.h"
 #include "map/rebase.h"
 #include "rebase_fixture.h"
 

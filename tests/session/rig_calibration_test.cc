@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include "camera/focal_lengths.h"
 #include "rig_formats/bslam_rig.h"
 #include "simulator/simulation_writer.h"
 #include "synthetic/rigs.h"

@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include "camera/model_parameters.h"
 #include "geometry/so3.h"
 #include "tracking/simulated_tracker.h"
 
@@ -13,16 +12,13 @@ namespace {
 using geometry::SE3;
 using geometry::Vector3d;
 
-double focal_length(const camera::Camera& camera) { return camera::parameters(camera.model)(0); }
+double focal_length(const camera::Camera& camera) { return camera::intrinsics(camera.model).fx; }
 
 // Focal lengths multiplied by `factors`, the last camera turned by 3 degrees and moved by 2 cm.
 camera::Rig rough(const camera::Rig& rig, const std::vector<double>& factors) {
   std::vector<camera::RigCamera> cameras;
   for (std::size_t c = 0; c < rig.size(); ++c) {
-    camera::RigCamera camera{rig.camera(c), rig.body_from_cam(c)};
-    camera::ModelParameters parameters = camera::parameters(camera.camera.model);
-    parameters.head<2>() *= factors[c];
-    camera.camera.model = camera::with_parameters(camera.camera.model, parameters);
+    camera::RigCamera camera{camera::zoomed(rig.camera(c), factors[c]), rig.body_from_cam(c)};
     if (c + 1 == rig.size()) {
       const SE3 error(geometry::so3_exp(3.0 * kDegree * Vector3d(0.6, -0.5, 0.62).normalized()),
                       Vector3d(0.012, 0.006, 0.014));
