@@ -3,12 +3,13 @@
 
 #include "../tests/solver/scene.h"
 #include "estimators/absolute_pose.h"
-#include "solver/pose_graph.h"
+#include "looping/pose_graph.h"
 
 namespace bslam::solver {
 namespace {
 
 using geometry::Sim3;
+using looping::PoseGraphProblem;
 
 // range(0) vertices on two laps of a circle, with edges from every vertex to the four previous ones and, in the second
 // lap, to the vertex at the same position of the first lap. The initial values are the concatenated odometry.
@@ -47,7 +48,7 @@ void pose_graph(benchmark::State& state, bool free_scale) {
   LmSummary summary;
   for (auto _ : state) {
     PoseGraphProblem problem = start;
-    summary = optimise(problem, {});
+    summary = looping::optimise(problem, {});
     benchmark::DoNotOptimize(problem.S_world.data());
   }
   state.counters["edges"] = static_cast<double>(start.edges.size());

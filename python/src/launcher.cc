@@ -77,7 +77,8 @@ int main(int, char** argv) {
   // command: the program then uses python3 from PATH.
   if (python.starts_with(root + "/bin/")) setenv("BSLAM_PYTHON", python.c_str(), 0);
   std::vector<std::string> found = programs(root);
-  std::ranges::stable_partition(found, [&](const std::string& p) { return p.find(version) != std::string::npos; });
+  std::stable_partition(found.begin(), found.end(),
+                        [&](const std::string& p) { return p.find(version) != std::string::npos; });
   for (const std::string& program : found) execv(program.c_str(), argv);
   std::fprintf(stderr, "bslam: cannot find the Python package below %s\n", root.c_str());
   return 1;

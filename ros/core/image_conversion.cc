@@ -86,9 +86,9 @@ std::vector<std::uint8_t> binomial(const std::vector<std::uint8_t>& in, std::siz
                                       i + 1 < n ? i + 1 : (n > 1 ? n - 2 : 0)};
   };
   for (std::size_t y = 0; y < height; ++y) {
-    const auto [above, below] = mirrored(y, height);
+    const std::array<std::size_t, 2> rows = mirrored(y, height);
     const auto column = [&](std::size_t x) {
-      return in[above * width + x] + 2 * in[y * width + x] + in[below * width + x];
+      return in[rows[0] * width + x] + 2 * in[y * width + x] + in[rows[1] * width + x];
     };
     for (std::size_t x = 0; x < width; ++x) {
       const auto [left, right] = mirrored(x, width);

@@ -38,6 +38,8 @@ struct BundledFrame {
   // Velocity of the rig during the capture, rad/s and m/s (see camera::Rig::moving), estimated by tracking; zero if
   // unknown. For keyframes BundledKeyframe::twist is used instead.
   geometry::Vector6d twist = geometry::Vector6d::Zero();
+  // The twist is not known: images that were captured at different times must not be compared.
+  bool motion_unknown = false;
   std::optional<StereoScale> stereo_scale =
       {};  // of a keyframe, found by tracking for mapping (tracking/stereo_scale.h)
 

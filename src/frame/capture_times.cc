@@ -5,6 +5,11 @@
 
 namespace bslam::frame {
 
+bool can_be_compared(const BundledFrame& frame, CameraIndex a, CameraIndex b) {
+  const TimeNs apart = frame.cameras[a.index()].time_ns - frame.cameras[b.index()].time_ns;
+  return !frame.motion_unknown || std::abs(apart) <= kTogetherNs;
+}
+
 std::vector<std::uint8_t> without_late_cameras(const camera::Rig& rig, const image::ImageBundle& images,
                                                std::span<const std::uint8_t> skipped) {
   std::vector<std::uint8_t> out(skipped.begin(), skipped.end());

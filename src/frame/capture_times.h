@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "camera/rig.h"
+#include "frame/bundled_frame.h"
 #include "image/image_bundle.h"
 
 namespace bslam::frame {
@@ -13,6 +14,10 @@ namespace bslam::frame {
 // Maximum difference of capture times that counts as simultaneous: at 1 rad/s and a focal length of
 // 500 px the image moves by a pixel.
 constexpr TimeNs kTogetherNs = 2'000'000;
+
+// Returns true if the images of the two cameras can be compared: they were captured together, or the motion of the rig
+// is known.
+bool can_be_compared(const BundledFrame& frame, CameraIndex a, CameraIndex b);
 
 // Flags the cameras to skip while the motion of the rig is unknown: those in `skipped`, and those whose image was not
 // captured at the time of the frame. Returns `skipped` if otherwise no image would remain, or if no overlapping views

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "frame/capture_times.h"
 #include "matching/epipolar_search.h"
 #include "matching/point_estimation.h"
 
@@ -248,7 +249,8 @@ frame::BundledFrame bundle(const camera::Rig& rig, const frame::BundledFrame& ex
                            std::span<const image::Pyramid> pyramids, const BundlingOptions& options,
                            std::span<const AlignmentOptions> alignment, ThreadPool& pool) {
   const std::span<const frame::CameraFrame> detected = extracted.cameras;
-  const std::vector<CameraPair> pairs = overlapping_pairs(rig);
+  std::vector<CameraPair> pairs = overlapping_pairs(rig);
+  std::erase_if(pairs, [&](const CameraPair& p) { return !frame::can_be_compared(extracted, p.a, p.b); });
   std::vector<std::vector<Edge>> found(pairs.size());
   pool.for_each(pairs.size(),
                 [&](std::size_t p) { found[p] = match_pair(rig, detected, pyramids, pairs[p], options, alignment); });

@@ -44,7 +44,8 @@ struct BundlingOptions {
 // merges pairs into features of several cameras and triangulates them. A match that would give a feature two keypoints
 // in one camera is dropped in favour of the stronger matches. Returns the frame with the keypoints of matched features
 // at their aligned positions, their grids and the Bundled table. `rig`: the rig during the capture of the frame
-// (frame::rig_of). `pyramids` and `alignment`: one per camera; the pyramids are those of the extraction.
+// (frame::rig_of). Images captured at different times are not matched while the motion is unknown. `pyramids` and
+// `alignment`: one per camera; the pyramids are those of the extraction.
 frame::BundledFrame bundle(const camera::Rig& rig, const frame::BundledFrame& extracted,
                            std::span<const image::Pyramid> pyramids, const BundlingOptions& options,
                            std::span<const AlignmentOptions> alignment, ThreadPool& pool);

@@ -19,6 +19,7 @@ FramePreparation::FramePreparation(const camera::Rig& rig, const Config& config,
 BundledFrame FramePreparation::begin(const image::ImageBundle& images, const tracking::FramePlan& plan) {
   BundledFrame frame = builder_.begin(images, pool_, plan.skipped);
   frame.twist = plan.twist;
+  frame.motion_unknown = plan.motion_unknown;
   for (std::size_t c = 0; c < frame.cameras.size(); ++c) {
     const TimeNs correction = rig_->camera(c).time_offset_ns - given_.camera(c).time_offset_ns;
     TimeNs& time_ns = frame.cameras[c].time_ns;

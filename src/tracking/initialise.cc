@@ -8,6 +8,7 @@
 #include "estimators/generalised_scale.h"
 #include "feature/descriptor_matching.h"
 #include "frame/rig_at.h"
+#include "tracking/late_cameras.h"
 #include "tracking/stereo_scale.h"
 
 namespace bslam::tracking {
@@ -21,15 +22,6 @@ constexpr int kMaxHamming = 50;  // bits of 256; stricter than with a prediction
 constexpr double kRatio = 0.8;
 constexpr double kWindow = 0.25;  // rad, maximum angle between the bearings of a match in the two frames
 constexpr int kMinInliers = 50;
-
-// Matches of one camera between two frames.
-std::vector<feature::DescriptorMatch> match_frames(const feature::Keypoints& a, const feature::Keypoints& b) {
-  const double min_cosine = std::cos(kWindow);
-  const auto in_window = [&](std::size_t i, std::size_t j) {
-    return std::abs(a.level[i] - b.level[j]) <= 1 && a.bearing[i].dot(b.bearing[j]) >= min_cosine;
-  };
-  return feature::mutual_matches(a.descriptor, b.descriptor, kMaxHamming, kRatio, in_window);
-}
 
 struct TwoView {
   std::size_t camera = 0;
@@ -99,6 +91,17 @@ std::optional<InitialScale> scale_of_matched_features(const TwoView& view, const
   return InitialScale{ratio, (deviation + options.max_depth_error) / std::sqrt(features)};
 }
 
+// The two images from which the points of the view were triangulated.
+TwoImages two_images(const TwoView& view, const BundledFrame& first, const BundledFrame& second) {
+  const frame::CameraFrame& camera = first.cameras[view.camera];
+  TwoImages out{CameraIndex(view.camera), camera, second.cameras[view.camera], view.pose.T_b_a, {}};
+  out.points.resize(camera.keypoints.size());
+  for (std::size_t i = 0; i < view.pairs.size(); ++i) {
+    if (view.pose.inlier[i]) out.points[view.pairs[i].a.index()] = view.pose.points_a[i];
+  }
+  return out;
+}
+
 // Returns the length of the motion of a camera above which the rotation of the rig changes the direction of motion of
 // the other cameras by less than can be measured.
 double least_length(const TwoView& view, const camera::Rig& rig) {
@@ -116,7 +119,8 @@ double least_length(const TwoView& view, const camera::Rig& rig) {
 // the other cameras in clearly different directions, and their wrong matches that happen to agree with these directions
 // would be accepted.
 InitialScale choose_scale(const TwoView& view, const FramePairs& pairs, const BundledFrame& first,
-                          const camera::Rig& rig, const InitialisationOptions& options) {
+                          const std::optional<estimators::BaselineScale>& from_other_times, const camera::Rig& rig,
+                          const InitialisationOptions& options) {
   constexpr double kNoise_px = 1.25;  // pixels of small images are larger than the usual bound
   std::vector<double> depths;
   for (std::size_t i = 0; i < view.pairs.size(); ++i) {
@@ -125,6 +129,7 @@ InitialScale choose_scale(const TwoView& view, const FramePairs& pairs, const Bu
   const double depth = median(depths);
   if (rig.size() == 1) return {1.0 / depth, std::numeric_limits<double>::infinity()};
   if (const auto found = scale_of_matched_features(view, first, rig, options)) return *found;
+  if (from_other_times) return {from_other_times->scale, from_other_times->deviation};
   std::vector<estimators::CameraPairs> cameras;
   for (std::size_t c = 0; c < rig.size(); ++c) {
     estimators::CameraPairs camera{rig.cam_from_rig(c) * rig.rig_from_cam(view.camera), pairs.bearings[c]};
@@ -139,7 +144,22 @@ InitialScale choose_scale(const TwoView& view, const FramePairs& pairs, const Bu
   return {std::max(options.assumed_median_depth / depth, least), std::numeric_limits<double>::infinity()};
 }
 
+// The frame with the mean velocity between the two frames, if it matters; images captured at different times remain
+// unmatched.
+BundledFrame with_motion(BundledFrame frame, const camera::Rig& rig, const SE3& T_second_first, TimeNs passed_ns) {
+  if (passed_ns > 0 && frame::depends_on_motion(rig, frame)) frame.twist = T_second_first.log() / to_seconds(passed_ns);
+  return frame;
+}
+
 }  // namespace
+
+std::vector<feature::DescriptorMatch> match_frames(const feature::Keypoints& a, const feature::Keypoints& b) {
+  const double min_cosine = std::cos(kWindow);
+  const auto in_window = [&](std::size_t i, std::size_t j) {
+    return std::abs(a.level[i] - b.level[j]) <= 1 && a.bearing[i].dot(b.bearing[j]) >= min_cosine;
+  };
+  return feature::mutual_matches(a.descriptor, b.descriptor, kMaxHamming, kRatio, in_window);
+}
 
 bool comparable(const BundledFrame& first, const BundledFrame& second, const InitialisationOptions& options) {
   for (std::size_t c = 0; c < first.cameras.size(); ++c) {
@@ -160,25 +180,32 @@ std::optional<StartedMap> initialise_metric(const BundledFrame& frame, std::span
   return out;
 }
 
-std::optional<StartedMap> initialise_monocular(const StartCandidate& first, const BundledFrame& frame,
-                                               std::span<const image::Pyramid> pyramids,
-                                               const InitialisationOptions& options, Random random,
-                                               map::MapDraft& draft) {
-  const frame::RigAt rig_at(draft.map().rig(), frame);
+std::optional<StartedMap> initialise_monocular(const StartFrames& frames, const InitialisationOptions& options,
+                                               Random random, map::MapDraft& draft) {
+  const StartCandidate& first = frames.first;
+  const BundledFrame& second = frames.second;
+  const frame::RigAt rig_at(draft.map().rig(), second);
   const camera::Rig& rig = *rig_at;
-  const FramePairs pairs = match_cameras(*first.frame, frame);
+  const FramePairs pairs = match_cameras(*first.frame, second);
   const auto view = best_two_view(pairs, rig, options, random.next());
   if (!view) return std::nullopt;
-  const InitialScale scale = choose_scale(*view, pairs, *first.frame, rig, options);
+  std::vector<const BundledFrame*> between{&second};
+  for (const auto& frame : frames.between) between.push_back(frame.get());
+  const auto from_other_times = scale_from_other_times(rig, two_images(*view, *first.frame, second), between);
+  const InitialScale scale = choose_scale(*view, pairs, *first.frame, from_other_times, rig, options);
+  if (frames.scale_needed && !std::isfinite(scale.deviation)) return std::nullopt;
   const SE3 T_b_a(view->pose.T_b_a.rotation(), scale.length * view->pose.T_b_a.translation());
-  const SE3 T_cam_rig = rig.cam_from_rig(view->camera), T_rig_cam = T_cam_rig.inverse();
+  const SE3 T_second_first = rig.rig_from_cam(view->camera) * T_b_a * rig.cam_from_rig(view->camera);
+  const BundledFrame a = with_motion(*first.frame, rig, T_second_first, second.time_ns - first.frame->time_ns);
+  const BundledFrame b = with_motion(second, rig, T_second_first, second.time_ns - first.frame->time_ns);
+  const SE3 T_rig_cam = frame::rig_of(draft.map().rig(), a).rig_from_cam(view->camera);
 
   StartedMap out;
   out.scale = rig.size() == 1 ? map::Scale::kUpToScale : map::Scale::kUnobservable;
   out.scale_deviation = scale.deviation;
-  out.keyframes.push_back(make_keyframe(*first.frame, {}, SE3(), first.pyramids, KeyframeId(), options, draft));
+  out.keyframes.push_back(make_keyframe(a, {}, SE3(), first.pyramids, KeyframeId(), options, draft));
   const KeyframeId key_a = out.keyframes[0].keyframe;
-  out.keyframes.push_back(make_keyframe(frame, {}, T_rig_cam * T_b_a * T_cam_rig, pyramids, key_a, options, draft));
+  out.keyframes.push_back(make_keyframe(b, {}, T_second_first, frames.pyramids, key_a, options, draft));
   const KeyframeId key_b = out.keyframes[1].keyframe;
   const CameraIndex camera(view->camera);
   for (std::size_t i = 0; i < view->pairs.size(); ++i) {

@@ -8,6 +8,46 @@ namespace bslam::tracking {
 
 using geometry::SE3;
 
+namespace {
+
+// A camera of the frame: its delay divided by the time since the last frame, and its weight for the pose.
+struct DelayedCamera {
+  double delay = 0, weight = 0;
+};
+
+std::vector<DelayedCamera> delayed_cameras(const TrackerState& state, const solver::MotionModel& motion,
+                                           const frame::BundledFrame& frame, double dt) {
+  std::vector<DelayedCamera> out;
+  for (std::size_t c = 0; c < frame.cameras.size(); ++c) {
+    if (frame.cameras[c].state != image::ImageState::kPresent) continue;
+    const bool known = c < state.cameras.size();
+    if (known && state.cameras[c].excluded) continue;
+    out.push_back({motion.delay_s[c] / dt, known ? static_cast<double>(state.cameras[c].landmarks.size()) : 0.0});
+  }
+  return out;
+}
+
+// The largest gain, up to the wanted one, with which an error of the last pose does not grow from frame to frame. With
+// the delays u and a gain g, errors x of the pose satisfy in the mean over the cameras, by their weights,
+//   (1 + u g) ((1 + u g) x_n - u (2 g - 1) x_(n-1) + u (g - 1) x_(n-2)) = 0.
+// If most of the images are early, that is u < 0, the poses can alternate around the true ones.
+double stable_gain(double wanted, std::span<const DelayedCamera> cameras) {
+  constexpr double kMargin = 0.5, kStep = 0.05;
+  const auto is_stable = [&](double gain) {
+    double squares = 0.0, alternating = 0.0;
+    for (const auto [u, weight] : cameras) {
+      squares += weight * (1.0 + u * gain) * (1.0 + u * gain);
+      alternating += weight * (1.0 + u * gain) * (1.0 + u * (4.0 * gain - 2.0));
+    }
+    return alternating >= kMargin * squares;
+  };
+  double gain = wanted;
+  while (gain > 0.5 && !is_stable(gain)) gain -= kStep;
+  return gain;
+}
+
+}  // namespace
+
 bool keeps_twist(const TrackerState& state, TimeNs time_ns) {
   constexpr double kFastest_s = 0.005;
   const double dt = to_seconds(time_ns - state.time_ns);
@@ -42,8 +82,9 @@ solver::MotionModel motion_model(const TrackInput& input, const frame::BundledFr
   if (!input.state.twist) return motion;
   // From the middle of this interval to the middle of the delays, in distances of the middles of the two intervals.
   const double ahead = (dt + frame::farthest_delay_s(frame)) / (dt + input.state.twist_interval_s);
-  motion.gain = (1.0 + ahead) / dt;
-  motion.offset = -ahead * *input.state.twist;
+  const double gain = stable_gain(1.0 + ahead, delayed_cameras(input.state, motion, frame, dt));
+  motion.gain = gain / dt;
+  motion.offset = (1.0 - gain) * *input.state.twist;
   return motion;
 }
 

@@ -135,7 +135,7 @@ FramePlan Tracker::plan(const image::ImageBundle& images, const ImageFaults& fau
     if (out[c] && state.used[c] && !gone[c]) state.incomplete_ns = images.time_ns;
   }
   const bool recent = to_seconds(images.time_ns - state.track.time_ns) <= kMaxPrediction_s;
-  const bool motion_known = state.track.twist && recent;
+  const bool motion_known = (state.track.twist && recent) || state.at_rest;
   const bool motion_matters = options_.tracking.use_capture_times && !motion_known;
   plan.skipped = motion_matters ? frame::without_late_cameras(rig_, images, out) : out;
   for (std::size_t c = 0; c < out.size(); ++c) plan.postponed.push_back(plan.skipped[c] && !out[c]);
@@ -143,7 +143,8 @@ FramePlan Tracker::plan(const image::ImageBundle& images, const ImageFaults& fau
   for (std::size_t c = 0; c < failing.size(); ++c) failing[c] |= faults.failing[c];
   plan.budgets = budgets(state, plan.skipped, failing);
   plan.alignment = alignment(state);
-  if (motion_known) plan.twist = *state.track.twist;
+  plan.motion_unknown = motion_matters;
+  if (state.track.twist && recent) plan.twist = *state.track.twist;
   return plan;
 }
 

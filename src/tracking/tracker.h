@@ -45,6 +45,7 @@ struct FramePlan {
   std::vector<int> budgets;             // target number of keypoints
   std::vector<matching::AlignmentOptions> alignment;
   geometry::Vector6d twist = geometry::Vector6d::Zero();  // predicted motion of the rig, zero if unknown
+  bool motion_unknown = false;
 };
 
 inline constexpr int kMaxPendingFrames = 10;  // number of frames in which a pending keyframe is waited for
@@ -77,6 +78,7 @@ struct FrontEndState {
   // During a monocular initialisation: the reference frames, oldest first, and all frames since the oldest.
   std::vector<StartReference> start_references;
   std::vector<std::shared_ptr<const frame::BundledFrame>> waiting;
+  bool at_rest = false;     // the rig did not move between the last two frames, before a map is started
   int direct_failures = 0;  // consecutive attempts of direct tracking that found no pose
   int direct_pause = 0;     // number of frames until the next attempt
   int direct_kept = 0;      // number of poses from direct tracking that were kept since features last gave a pose

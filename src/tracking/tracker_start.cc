@@ -1,6 +1,9 @@
 // Initialisation of a map by the tracker, if there is no map or the rig cannot be located in it.
+#include <functional>
+
 #include "base/stopwatch.h"
 #include "map/keyframe_landmarks.h"
+#include "tracking/late_cameras.h"
 #include "tracking/start_correction.h"
 #include "tracking/tracker.h"
 
@@ -10,6 +13,7 @@ namespace {
 using frame::BundledFrame;
 
 constexpr int kMetricAttempts = 5;  // frames in which only metric initialisation is attempted if cameras overlap
+constexpr int kScaleAttempts = 20;  // frames in which the scale has to be found if they do so at other times
 // Maximum age of the reference frame of a monocular initialisation, if both are exceeded.
 constexpr int kMaxStartAge = 100;  // frames
 constexpr double kMaxStartAge_s = 10;
@@ -58,6 +62,8 @@ bool from_other_cameras(const BundledFrame& a, const BundledFrame& b) {
 void Tracker::start(Input& input, TrackOutcome& outcome) const {
   const Stopwatch watch;
   outcome.record.result = not_started(input.frame);
+  FrontEndState& state = outcome.next;
+  state.at_rest = !state.waiting.empty() && at_rest(*state.waiting.back(), input.frame);
   if (correct_rig(input, outcome)) {
     outcome.record.stages.push_back({"start", watch.ms()});
     return;
@@ -92,19 +98,25 @@ std::optional<StartedMap> Tracker::initialise(const Input& input, const FrontEnd
   if (overlap) {
     if (auto started = initialise_metric(input.frame, input.pyramids, options, draft)) return started;
   }
+  // Images of several cameras cannot be compared while the rig moves in an unknown way.
+  std::vector<std::uint8_t> apart = late_cameras(input.frame);
+  std::ranges::transform(apart, gone, apart.begin(), std::bit_or());
+  const bool together = rig_.any_overlap(apart);
   // The scale is a property of the whole map. Overlapping cameras will start a metric submap sooner or later, and one
   // camera alone never does.
   const bool metric = input.map->num_keyframes() > 0 && input.map->scale() == map::Scale::kMetric;
   const bool single = std::ranges::count(gone, std::uint8_t{0}) <= 1;
-  if (metric && (overlap || single)) return std::nullopt;
-  const int metric_attempts = overlap ? kMetricAttempts : 0;
+  if (metric && (together || single)) return std::nullopt;
+  const int metric_attempts = together ? kMetricAttempts : 0;
   if (state.start_references.empty()) return std::nullopt;
-  const FrameId oldest = state.start_references.front().candidate->frame->id;
-  if (input.frame.id.value() - oldest.value() < metric_attempts) return std::nullopt;
+  const auto age = input.frame.id.value() - state.start_references.front().candidate->frame->id.value();
+  if (age < metric_attempts) return std::nullopt;
+  const bool scale_needed = overlap && !together && age < kScaleAttempts;
   const Random random(options_.seed, "start", static_cast<std::uint64_t>(input.frame.id.value()));
   for (const StartReference& reference : state.start_references) {
     const StartCandidate& first = *reference.candidate;
-    if (auto started = initialise_monocular(first, input.frame, input.pyramids, options, random, draft)) return started;
+    const StartFrames frames{first, input.frame, input.pyramids, state.waiting, scale_needed};
+    if (auto started = initialise_monocular(frames, options, random, draft)) return started;
   }
   return std::nullopt;
 }
@@ -138,6 +150,7 @@ bool Tracker::correct_rig(const Input& input, TrackOutcome& outcome) const {
 void Tracker::restart_monocular_start(FrontEndState& state) {
   state.start_references.clear();
   state.waiting.clear();
+  state.at_rest = false;
 }
 
 // Stores the frame. Reference frames that are too old or have too few matches with it are removed. A frame of other
@@ -174,6 +187,11 @@ void Tracker::complete_start(const map::CommitReport& report, TrackOutcome& outc
                                   committed_landmarks(outcome.edit->landmarks, outcome.edit->base_landmarks, report));
   state.track.cameras = readmit_observing_cameras(std::vector<CameraConsensusState>(rig_.size()),
                                                   map::landmarks_by_camera(keyframe), options_.tracking.consensus);
+  if (report.keyframes.size() == 2 && frame::depends_on_motion(report.published->rig(), *keyframe.frame)) {
+    state.track.twist = keyframe.twist;
+    state.track.twist_interval_s =
+        to_seconds(result.time_ns - report.published->keyframe(report.keyframes.front()).frame->time_ns);
+  }
   result.status = TrackStatus::kTracking;
   result.reason = LostReason::kNone;
   result.T_rig_world = keyframe.T_rig_world;

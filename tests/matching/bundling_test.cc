@@ -160,6 +160,20 @@ TEST_F(Bundle, DoesNotDependOnTheNumberOfThreads) {
 }
 
 // Only keypoints of matched features are moved, and the detected keypoints are unchanged.
+TEST_F(Bundle, DoesNotMatchImagesOfOtherTimesWhileTheMotionIsUnknown) {
+  frame::BundledFrame extracted = builder.extract(rig, images, pool);
+  const auto num_matched = [&] {
+    return bundle(rig, extracted, builder.pyramids(), {}, alignment, pool).bundled.num_matched();
+  };
+  extracted.motion_unknown = true;
+  EXPECT_GT(num_matched(), 0u);
+  for (std::size_t c = 1; c < extracted.cameras.size(); ++c)
+    extracted.cameras[c].time_ns += static_cast<TimeNs>(c) * from_seconds(0.01);
+  EXPECT_EQ(num_matched(), 0u);
+  extracted.motion_unknown = false;
+  EXPECT_GT(num_matched(), 0u);
+}
+
 TEST_F(Bundle, MovesOnlyKeypointsOfMatchedFeatures) {
   const frame::BundledFrame extracted = builder.extract(rig, images, pool);
   std::vector<feature::Refinement> detected;

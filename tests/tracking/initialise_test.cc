@@ -65,8 +65,8 @@ class InitialiseMonocular : public ::testing::Test {
                                   map::MapDraft& draft, const InitialisationOptions& options = {}) {
     const StartCandidate candidate{std::make_shared<const frame::BundledFrame>(first.frame),
                                    map::flat_pyramids(first.frame.cameras.size())};
-    return initialise_monocular(candidate, second.frame, map::flat_pyramids(first.frame.cameras.size()), options,
-                                Random(1), draft);
+    const auto pyramids = map::flat_pyramids(first.frame.cameras.size());
+    return initialise_monocular({candidate, second.frame, pyramids, {}}, options, Random(1), draft);
   }
   // Ahead and 120 degrees to either side.
   static camera::Rig three_sides(int width = 752) {
