@@ -1,15 +1,18 @@
 #include "tracking/initialise.h"
 
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <utility>
 
 #include "base/median.h"
 #include "estimators/generalised_scale.h"
 #include "feature/descriptor_matching.h"
+#include "frame/capture_times.h"
 #include "frame/rig_at.h"
 #include "tracking/late_cameras.h"
 #include "tracking/stereo_scale.h"
+#include "tracking/track.h"
 
 namespace bslam::tracking {
 namespace {
@@ -69,6 +72,8 @@ std::optional<TwoView> best_two_view(const FramePairs& pairs, const camera::Rig&
 struct InitialScale {
   double length = 1;
   double deviation = std::numeric_limits<double>::infinity();
+  // Velocity of the camera in both frames, if it was estimated: before it is scaled.
+  std::optional<std::array<geometry::Vector6d, 2>> twists = {};
 };
 
 // The scale at which the points of the two views have the depths of matched features, which become landmarks as well:
@@ -102,6 +107,13 @@ TwoImages two_images(const TwoView& view, const BundledFrame& first, const Bundl
   return out;
 }
 
+std::vector<const BundledFrame*> all_of(const StartFrames& frames) {
+  std::vector<const BundledFrame*> out;
+  for (const auto& frame : frames.between) out.push_back(frame.get());
+  out.push_back(&frames.second);
+  return out;
+}
+
 // Returns the length of the motion of a camera above which the rotation of the rig changes the direction of motion of
 // the other cameras by less than can be measured.
 double least_length(const TwoView& view, const camera::Rig& rig) {
@@ -118,9 +130,8 @@ double least_length(const TwoView& view, const camera::Rig& rig) {
 // If the scale cannot be estimated well, it must not be chosen too small: in a small map the rotation of the rig moves
 // the other cameras in clearly different directions, and their wrong matches that happen to agree with these directions
 // would be accepted.
-InitialScale choose_scale(const TwoView& view, const FramePairs& pairs, const BundledFrame& first,
-                          const std::optional<estimators::BaselineScale>& from_other_times, const camera::Rig& rig,
-                          const InitialisationOptions& options) {
+InitialScale choose_scale(const TwoView& view, const FramePairs& pairs, const StartFrames& frames,
+                          const camera::Rig& rig, const InitialisationOptions& options) {
   constexpr double kNoise_px = 1.25;  // pixels of small images are larger than the usual bound
   std::vector<double> depths;
   for (std::size_t i = 0; i < view.pairs.size(); ++i) {
@@ -128,8 +139,10 @@ InitialScale choose_scale(const TwoView& view, const FramePairs& pairs, const Bu
   }
   const double depth = median(depths);
   if (rig.size() == 1) return {1.0 / depth, std::numeric_limits<double>::infinity()};
+  const BundledFrame& first = *frames.first.frame;
   if (const auto found = scale_of_matched_features(view, first, rig, options)) return *found;
-  if (from_other_times) return {from_other_times->scale, from_other_times->deviation};
+  if (const auto found = scale_from_other_times(rig, two_images(view, first, frames.second), all_of(frames)))
+    return {found->scale.scale, found->scale.deviation, std::array{found->first_twist, found->second_twist}};
   std::vector<estimators::CameraPairs> cameras;
   for (std::size_t c = 0; c < rig.size(); ++c) {
     estimators::CameraPairs camera{rig.cam_from_rig(c) * rig.rig_from_cam(view.camera), pairs.bearings[c]};
@@ -144,10 +157,31 @@ InitialScale choose_scale(const TwoView& view, const FramePairs& pairs, const Bu
   return {std::max(options.assumed_median_depth / depth, least), std::numeric_limits<double>::infinity()};
 }
 
-// The frame with the mean velocity between the two frames, if it matters; images captured at different times remain
-// unmatched.
-BundledFrame with_motion(BundledFrame frame, const camera::Rig& rig, const SE3& T_second_first, TimeNs passed_ns) {
-  if (passed_ns > 0 && frame::depends_on_motion(rig, frame)) frame.twist = T_second_first.log() / to_seconds(passed_ns);
+// Velocities of the rig in both frames: those found with the scale, or the mean one if there is not much time between
+// the frames. Returns nullopt if they do not matter or are not known.
+std::optional<std::array<geometry::Vector6d, 2>> twists(const TwoView& view, const InitialScale& scale,
+                                                        const StartFrames& frames, const camera::Rig& rig,
+                                                        const SE3& T_second_first) {
+  if (scale.twists) {
+    const geometry::Matrix6d to_rig = rig.rig_from_cam(view.camera).adjoint();
+    const auto in_rig = [&](std::size_t i) -> geometry::Vector6d {
+      return to_rig * geometry::scaled((*scale.twists)[i], scale.length);
+    };
+    return std::array{in_rig(0), in_rig(1)};
+  }
+  const BundledFrame& first = *frames.first.frame;
+  const double passed_s = to_seconds(frames.second.time_ns - first.time_ns);
+  const auto apart = [](const BundledFrame& f) {
+    return f.motion_unknown && std::abs(frame::farthest_delay_s(f)) > to_seconds(frame::kTogetherNs);
+  };
+  if ((!apart(first) && !apart(frames.second)) || passed_s <= 0.0 || passed_s > kMaxPrediction_s) return std::nullopt;
+  const geometry::Vector6d mean = T_second_first.log() / passed_s;
+  return std::array{mean, mean};
+}
+
+BundledFrame with_twist(BundledFrame frame, const geometry::Vector6d& twist) {
+  frame.twist = twist;
+  frame.motion_unknown = false;
   return frame;
 }
 
@@ -189,15 +223,13 @@ std::optional<StartedMap> initialise_monocular(const StartFrames& frames, const 
   const FramePairs pairs = match_cameras(*first.frame, second);
   const auto view = best_two_view(pairs, rig, options, random.next());
   if (!view) return std::nullopt;
-  std::vector<const BundledFrame*> between{&second};
-  for (const auto& frame : frames.between) between.push_back(frame.get());
-  const auto from_other_times = scale_from_other_times(rig, two_images(*view, *first.frame, second), between);
-  const InitialScale scale = choose_scale(*view, pairs, *first.frame, from_other_times, rig, options);
+  const InitialScale scale = choose_scale(*view, pairs, frames, rig, options);
   if (frames.scale_needed && !std::isfinite(scale.deviation)) return std::nullopt;
   const SE3 T_b_a(view->pose.T_b_a.rotation(), scale.length * view->pose.T_b_a.translation());
   const SE3 T_second_first = rig.rig_from_cam(view->camera) * T_b_a * rig.cam_from_rig(view->camera);
-  const BundledFrame a = with_motion(*first.frame, rig, T_second_first, second.time_ns - first.frame->time_ns);
-  const BundledFrame b = with_motion(second, rig, T_second_first, second.time_ns - first.frame->time_ns);
+  const auto motion = twists(*view, scale, frames, rig, T_second_first);
+  const BundledFrame a = motion ? with_twist(*first.frame, (*motion)[0]) : *first.frame;
+  const BundledFrame b = motion ? with_twist(second, (*motion)[1]) : second;
   const SE3 T_rig_cam = frame::rig_of(draft.map().rig(), a).rig_from_cam(view->camera);
 
   StartedMap out;

@@ -6,7 +6,6 @@
 
 #include "estimators/relative_pose.h"
 #include "feature/descriptor_matching.h"
-#include "tracking/late_cameras.h"
 #include "tracking/make_keyframe.h"
 
 namespace bslam::tracking {

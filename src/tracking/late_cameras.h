@@ -11,11 +11,11 @@
 
 namespace bslam::tracking {
 
-// Flags the cameras with keypoints that were captured at another time than the frame, if the motion is not known.
-std::vector<std::uint8_t> late_cameras(const frame::BundledFrame& frame);
+// Returns true if both cameras have keypoints, but captured at different times between which the motion is not known.
+bool captured_apart(const frame::BundledFrame& frame, std::size_t i, std::size_t j);
 
 // Returns true if cameras of the second frame captured at different times, but the images of each camera hardly changed
-// since the first one, so that they can be compared all the same.
+// since the first one, shortly before, so that they can be compared all the same.
 bool at_rest(const frame::BundledFrame& first, const frame::BundledFrame& second);
 
 // Points and motion of one camera between two images, up to scale.
@@ -27,10 +27,18 @@ struct TwoImages {
   std::vector<std::optional<Eigen::Vector3d>> points;  // per keypoint of the first image, in the camera
 };
 
-// Metres per unit of `images`, from images in which other cameras show the same points at other times. The camera was
-// then where its poses in `frames`, which are estimated from the points, show it by constant acceleration. Returns
-// nullopt if other cameras show too few of the points, or if there are no such images between the two.
-std::optional<estimators::BaselineScale> scale_from_other_times(const camera::Rig& rig, const TwoImages& images,
-                                                                std::span<const frame::BundledFrame* const> frames);
+struct ScaleFromOtherTimes {
+  estimators::BaselineScale scale;  // metres per unit of the images
+  // Mean velocity of the camera for some tenths of a second at the first and at the second image, as
+  // camera::Rig::moving, up to scale.
+  geometry::Vector6d first_twist, second_twist;
+};
+
+// The scale from images in which other cameras show the same points at other times. The camera was then where its poses
+// in `frames`, which are estimated from the points, show it by constant acceleration. Cameras that also capture
+// together with the camera are left out, since their matches show the scale. Returns nullopt if other cameras show too
+// few of the points, or if there are no such images between the two.
+std::optional<ScaleFromOtherTimes> scale_from_other_times(const camera::Rig& rig, const TwoImages& images,
+                                                          std::span<const frame::BundledFrame* const> frames);
 
 }  // namespace bslam::tracking

@@ -1,5 +1,6 @@
 #include "tracking/motion_prediction.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "base/median.h"
@@ -24,6 +25,9 @@ std::vector<DelayedCamera> delayed_cameras(const TrackerState& state, const solv
     if (known && state.cameras[c].excluded) continue;
     out.push_back({motion.delay_s[c] / dt, known ? static_cast<double>(state.cameras[c].landmarks.size()) : 0.0});
   }
+  if (std::ranges::all_of(out, [](const DelayedCamera& c) { return c.weight == 0.0; })) {
+    for (DelayedCamera& camera : out) camera.weight = 1.0;  // nothing was observed yet
+  }
   return out;
 }
 
@@ -34,12 +38,13 @@ std::vector<DelayedCamera> delayed_cameras(const TrackerState& state, const solv
 double stable_gain(double wanted, std::span<const DelayedCamera> cameras) {
   constexpr double kMargin = 0.5, kStep = 0.05;
   const auto is_stable = [&](double gain) {
-    double squares = 0.0, alternating = 0.0;
+    double sum = 0.0, squares = 0.0, alternating = 0.0;
     for (const auto [u, weight] : cameras) {
+      sum += weight * (1.0 + u * gain);
       squares += weight * (1.0 + u * gain) * (1.0 + u * gain);
       alternating += weight * (1.0 + u * gain) * (1.0 + u * (4.0 * gain - 2.0));
     }
-    return alternating >= kMargin * squares;
+    return sum > 0.0 && alternating >= kMargin * squares;
   };
   double gain = wanted;
   while (gain > 0.5 && !is_stable(gain)) gain -= kStep;
@@ -81,10 +86,11 @@ solver::MotionModel motion_model(const TrackInput& input, const frame::BundledFr
   motion.gain = 1.0 / dt;
   if (!input.state.twist) return motion;
   // From the middle of this interval to the middle of the delays, in distances of the middles of the two intervals.
-  const double ahead = (dt + frame::farthest_delay_s(frame)) / (dt + input.state.twist_interval_s);
+  double ahead = (dt + frame::farthest_delay_s(frame)) / (dt + input.state.twist_interval_s);
   const double gain = stable_gain(1.0 + ahead, delayed_cameras(input.state, motion, frame, dt));
-  motion.gain = gain / dt;
-  motion.offset = (1.0 - gain) * *input.state.twist;
+  if (gain < 1.0 + ahead) ahead = gain - 1.0;
+  motion.gain = (1.0 + ahead) / dt;
+  motion.offset = -ahead * *input.state.twist;
   return motion;
 }
 

@@ -135,7 +135,9 @@ FramePlan Tracker::plan(const image::ImageBundle& images, const ImageFaults& fau
     if (out[c] && state.used[c] && !gone[c]) state.incomplete_ns = images.time_ns;
   }
   const bool recent = to_seconds(images.time_ns - state.track.time_ns) <= kMaxPrediction_s;
-  const bool motion_known = (state.track.twist && recent) || state.at_rest;
+  const bool still = state.at_rest && !state.waiting.empty() &&
+                     to_seconds(images.time_ns - state.waiting.back()->time_ns) <= kMaxPrediction_s;
+  const bool motion_known = (state.track.twist && recent) || still;
   const bool motion_matters = options_.tracking.use_capture_times && !motion_known;
   plan.skipped = motion_matters ? frame::without_late_cameras(rig_, images, out) : out;
   for (std::size_t c = 0; c < out.size(); ++c) plan.postponed.push_back(plan.skipped[c] && !out[c]);

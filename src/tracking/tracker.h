@@ -78,6 +78,7 @@ struct FrontEndState {
   // During a monocular initialisation: the reference frames, oldest first, and all frames since the oldest.
   std::vector<StartReference> start_references;
   std::vector<std::shared_ptr<const frame::BundledFrame>> waiting;
+  int start_attempts = 0;   // frames in which the start of a map was attempted
   bool at_rest = false;     // the rig did not move between the last two frames, before a map is started
   int direct_failures = 0;  // consecutive attempts of direct tracking that found no pose
   int direct_pause = 0;     // number of frames until the next attempt

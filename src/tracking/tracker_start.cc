@@ -1,6 +1,4 @@
 // Initialisation of a map by the tracker, if there is no map or the rig cannot be located in it.
-#include <functional>
-
 #include "base/stopwatch.h"
 #include "map/keyframe_landmarks.h"
 #include "tracking/late_cameras.h"
@@ -13,7 +11,7 @@ namespace {
 using frame::BundledFrame;
 
 constexpr int kMetricAttempts = 5;  // frames in which only metric initialisation is attempted if cameras overlap
-constexpr int kScaleAttempts = 20;  // frames in which the scale has to be found if they do so at other times
+constexpr int kScaleAttempts = 20;  // frames in which the scale has to be found if they never capture together
 // Maximum age of the reference frame of a monocular initialisation, if both are exceeded.
 constexpr int kMaxStartAge = 100;  // frames
 constexpr double kMaxStartAge_s = 10;
@@ -57,13 +55,39 @@ bool from_other_cameras(const BundledFrame& a, const BundledFrame& b) {
   return a.num_keypoints() > 0 && b.num_keypoints() > 0;
 }
 
+// Returns true if two cameras that are not gone share a view and capture together, as far as the frames show.
+bool views_in_common(const camera::Rig& rig, std::span<const std::uint8_t> gone, const BundledFrame& frame,
+                     std::span<const std::shared_ptr<const BundledFrame>> before) {
+  const auto apart = [&](std::size_t i, std::size_t j) {
+    return captured_apart(frame, i, j) ||
+           std::ranges::any_of(before, [&](const auto& f) { return captured_apart(*f, i, j); });
+  };
+  for (std::size_t i = 0; i < rig.size(); ++i) {
+    for (std::size_t j = i + 1; j < rig.size(); ++j) {
+      if (!gone[i] && !gone[j] && rig.share_view(i, j) && !apart(i, j)) return true;
+    }
+  }
+  return false;
+}
+
+// The frame was matched as if the rig rested, but it has begun to move.
+void forget_matches(BundledFrame& frame) {
+  std::vector<std::size_t> counts;
+  for (const frame::CameraFrame& c : frame.cameras) counts.push_back(c.keypoints.size());
+  frame.bundled = frame::Bundled(counts, {}, {});
+  frame.motion_unknown = true;
+}
+
 }  // namespace
 
 void Tracker::start(Input& input, TrackOutcome& outcome) const {
   const Stopwatch watch;
   outcome.record.result = not_started(input.frame);
   FrontEndState& state = outcome.next;
-  state.at_rest = !state.waiting.empty() && at_rest(*state.waiting.back(), input.frame);
+  ++state.start_attempts;
+  const bool rested =
+      std::exchange(state.at_rest, !state.waiting.empty() && at_rest(*state.waiting.back(), input.frame));
+  if (rested && !state.at_rest) forget_matches(input.frame);
   if (correct_rig(input, outcome)) {
     outcome.record.stages.push_back({"start", watch.ms()});
     return;
@@ -98,10 +122,7 @@ std::optional<StartedMap> Tracker::initialise(const Input& input, const FrontEnd
   if (overlap) {
     if (auto started = initialise_metric(input.frame, input.pyramids, options, draft)) return started;
   }
-  // Images of several cameras cannot be compared while the rig moves in an unknown way.
-  std::vector<std::uint8_t> apart = late_cameras(input.frame);
-  std::ranges::transform(apart, gone, apart.begin(), std::bit_or());
-  const bool together = rig_.any_overlap(apart);
+  const bool together = views_in_common(rig_, gone, input.frame, state.waiting);
   // The scale is a property of the whole map. Overlapping cameras will start a metric submap sooner or later, and one
   // camera alone never does.
   const bool metric = input.map->num_keyframes() > 0 && input.map->scale() == map::Scale::kMetric;
@@ -111,7 +132,7 @@ std::optional<StartedMap> Tracker::initialise(const Input& input, const FrontEnd
   if (state.start_references.empty()) return std::nullopt;
   const auto age = input.frame.id.value() - state.start_references.front().candidate->frame->id.value();
   if (age < metric_attempts) return std::nullopt;
-  const bool scale_needed = overlap && !together && age < kScaleAttempts;
+  const bool scale_needed = overlap && !together && (metric || state.start_attempts <= kScaleAttempts);
   const Random random(options_.seed, "start", static_cast<std::uint64_t>(input.frame.id.value()));
   for (const StartReference& reference : state.start_references) {
     const StartCandidate& first = *reference.candidate;
@@ -151,6 +172,7 @@ void Tracker::restart_monocular_start(FrontEndState& state) {
   state.start_references.clear();
   state.waiting.clear();
   state.at_rest = false;
+  state.start_attempts = 0;
 }
 
 // Stores the frame. Reference frames that are too old or have too few matches with it are removed. A frame of other
@@ -187,10 +209,9 @@ void Tracker::complete_start(const map::CommitReport& report, TrackOutcome& outc
                                   committed_landmarks(outcome.edit->landmarks, outcome.edit->base_landmarks, report));
   state.track.cameras = readmit_observing_cameras(std::vector<CameraConsensusState>(rig_.size()),
                                                   map::landmarks_by_camera(keyframe), options_.tracking.consensus);
-  if (report.keyframes.size() == 2 && frame::depends_on_motion(report.published->rig(), *keyframe.frame)) {
+  if (report.keyframes.size() == 2 && !keyframe.twist.isZero()) {
     state.track.twist = keyframe.twist;
-    state.track.twist_interval_s =
-        to_seconds(result.time_ns - report.published->keyframe(report.keyframes.front()).frame->time_ns);
+    state.track.twist_interval_s = to_seconds(result.time_ns - state.waiting.back()->time_ns);
   }
   result.status = TrackStatus::kTracking;
   result.reason = LostReason::kNone;

