@@ -30,7 +30,7 @@ struct Agreement {
   double parallax = 0;  // root mean square of the angles by which the offset moves them, rad
 };
 
-// BaselineObservations that agree with this inverse scale, and the least-squares solution of them.
+// Observations that agree with this inverse scale, and the least-squares solution of them.
 Agreement agreement(std::span<const BaselineObservation> observations, std::span<const Equation> equations,
                     double inverse, double tolerance) {
   Agreement out;

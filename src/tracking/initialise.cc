@@ -142,7 +142,7 @@ InitialScale choose_scale(const TwoView& view, const FramePairs& pairs, const St
   const BundledFrame& first = *frames.first.frame;
   if (const auto found = scale_of_matched_features(view, first, rig, options)) return *found;
   if (const auto found = scale_from_other_times(rig, two_images(view, first, frames.second), all_of(frames)))
-    return {found->scale.scale, found->scale.deviation, std::array{found->first_twist, found->second_twist}};
+    return {found->scale.scale, found->scale.deviation, found->twists};
   std::vector<estimators::CameraPairs> cameras;
   for (std::size_t c = 0; c < rig.size(); ++c) {
     estimators::CameraPairs camera{rig.cam_from_rig(c) * rig.rig_from_cam(view.camera), pairs.bearings[c]};

@@ -207,7 +207,7 @@ std::optional<ScaleFromOtherTimes> scale_from_other_times(const camera::Rig& rig
     if (found && (!best || found->deviation < best->deviation)) best = found;
   }
   if (!best) return std::nullopt;
-  return ScaleFromOtherTimes{*best, first_twist(*track), last_twist(*track)};
+  return ScaleFromOtherTimes{*best, {first_twist(*track), last_twist(*track)}};
 }
 
 }  // namespace bslam::tracking

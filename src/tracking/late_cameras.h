@@ -2,6 +2,7 @@
 // once the motion between them is known.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <span>
 #include <vector>
@@ -31,7 +32,7 @@ struct ScaleFromOtherTimes {
   estimators::BaselineScale scale;  // metres per unit of the images
   // Mean velocity of the camera for some tenths of a second at the first and at the second image, as
   // camera::Rig::moving, up to scale.
-  geometry::Vector6d first_twist, second_twist;
+  std::array<geometry::Vector6d, 2> twists;
 };
 
 // The scale from images in which other cameras show the same points at other times. The camera was then where its poses

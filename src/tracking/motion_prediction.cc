@@ -87,8 +87,10 @@ solver::MotionModel motion_model(const TrackInput& input, const frame::BundledFr
   if (!input.state.twist) return motion;
   // From the middle of this interval to the middle of the delays, in distances of the middles of the two intervals.
   double ahead = (dt + frame::farthest_delay_s(frame)) / (dt + input.state.twist_interval_s);
-  const double gain = stable_gain(1.0 + ahead, delayed_cameras(input.state, motion, frame, dt));
-  if (gain < 1.0 + ahead) ahead = gain - 1.0;
+  if (std::ranges::min(motion.delay_s) < 0.0) {  // early images
+    const double gain = stable_gain(1.0 + ahead, delayed_cameras(input.state, motion, frame, dt));
+    if (gain < 1.0 + ahead) ahead = gain - 1.0;
+  }
   motion.gain = (1.0 + ahead) / dt;
   motion.offset = -ahead * *input.state.twist;
   return motion;

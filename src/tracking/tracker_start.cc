@@ -1,6 +1,7 @@
 // Initialisation of a map by the tracker, if there is no map or the rig cannot be located in it.
 #include "base/stopwatch.h"
 #include "map/keyframe_landmarks.h"
+#include "matching/bundling.h"
 #include "tracking/late_cameras.h"
 #include "tracking/start_correction.h"
 #include "tracking/tracker.h"
@@ -71,10 +72,8 @@ bool views_in_common(const camera::Rig& rig, std::span<const std::uint8_t> gone,
 }
 
 // The frame was matched as if the rig rested, but it has begun to move.
-void forget_matches(BundledFrame& frame) {
-  std::vector<std::size_t> counts;
-  for (const frame::CameraFrame& c : frame.cameras) counts.push_back(c.keypoints.size());
-  frame.bundled = frame::Bundled(counts, {}, {});
+void forget_matches(const camera::Rig& rig, BundledFrame& frame) {
+  frame.bundled = matching::make_bundled(rig, frame.cameras, {}, 0.0, 0.0);
   frame.motion_unknown = true;
 }
 
@@ -87,7 +86,7 @@ void Tracker::start(Input& input, TrackOutcome& outcome) const {
   ++state.start_attempts;
   const bool rested =
       std::exchange(state.at_rest, !state.waiting.empty() && at_rest(*state.waiting.back(), input.frame));
-  if (rested && !state.at_rest) forget_matches(input.frame);
+  if (rested && !state.at_rest) forget_matches(rig_, input.frame);
   if (correct_rig(input, outcome)) {
     outcome.record.stages.push_back({"start", watch.ms()});
     return;

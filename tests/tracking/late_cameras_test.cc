@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "matching/bundling.h"
 #include "tracking/initialise.h"
 #include "tracking/simulated_tracker.h"
 
@@ -26,9 +27,7 @@ class LateCameras : public ::testing::Test {
   // The motion is not known, so that nothing is matched between the cameras.
   synthetic::SimulatedFrame seen(int i, std::span<const int> missing = {}) const {
     synthetic::SimulatedFrame out = sim_.frame(FrameId(i), kInterval_s * i, missing);
-    std::vector<std::size_t> counts;
-    for (const frame::CameraFrame& c : out.frame.cameras) counts.push_back(c.keypoints.size());
-    out.frame.bundled = frame::Bundled(counts, {}, {});
+    out.frame.bundled = matching::make_bundled(sim_.rig(), out.frame.cameras, {}, 0.0, 0.0);
     out.frame.motion_unknown = true;
     return out;
   }
