@@ -10,6 +10,17 @@ bool can_be_compared(const BundledFrame& frame, CameraIndex a, CameraIndex b) {
   return !frame.motion_unknown || std::abs(apart) <= kTogetherNs;
 }
 
+bool captured_apart(const BundledFrame& frame, CameraIndex a, CameraIndex b) {
+  return !frame.cameras[a.index()].keypoints.empty() && !frame.cameras[b.index()].keypoints.empty() &&
+         !can_be_compared(frame, a, b);
+}
+
+double capture_span_s(const BundledFrame& frame) {
+  const std::vector<double> delays = delays_of(frame);
+  const auto [first, last] = std::ranges::minmax(delays);
+  return last - first;
+}
+
 std::vector<std::uint8_t> without_late_cameras(const camera::Rig& rig, const image::ImageBundle& images,
                                                std::span<const std::uint8_t> skipped) {
   std::vector<std::uint8_t> out(skipped.begin(), skipped.end());

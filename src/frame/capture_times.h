@@ -18,6 +18,10 @@ constexpr TimeNs kTogetherNs = 2'000'000;
 // Returns true if the images of the two cameras can be compared: they were captured together, or the motion of the rig
 // is known.
 bool can_be_compared(const BundledFrame& frame, CameraIndex a, CameraIndex b);
+// Returns true if both cameras have keypoints that cannot be compared.
+bool captured_apart(const BundledFrame& frame, CameraIndex a, CameraIndex b);
+// Time between the first and the last image of the frame.
+double capture_span_s(const BundledFrame& frame);
 
 // Flags the cameras to skip while the motion of the rig is unknown: those in `skipped`, and those whose image was not
 // captured at the time of the frame. Returns `skipped` if otherwise no image would remain, or if no overlapping views

@@ -7,9 +7,9 @@
 
 #include "base/median.h"
 #include "estimators/generalised_scale.h"
-#include "feature/descriptor_matching.h"
 #include "frame/capture_times.h"
 #include "frame/rig_at.h"
+#include "tracking/image_matches.h"
 #include "tracking/late_cameras.h"
 #include "tracking/stereo_scale.h"
 #include "tracking/track.h"
@@ -21,9 +21,6 @@ using frame::BundledFrame;
 using frame::KeypointRef;
 using geometry::SE3;
 
-constexpr int kMaxHamming = 50;  // bits of 256; stricter than with a prediction
-constexpr double kRatio = 0.8;
-constexpr double kWindow = 0.25;  // rad, maximum angle between the bearings of a match in the two frames
 constexpr int kMinInliers = 50;
 
 struct TwoView {
@@ -42,7 +39,7 @@ FramePairs match_cameras(const BundledFrame& first, const BundledFrame& second) 
   FramePairs out;
   for (std::size_t c = 0; c < first.cameras.size(); ++c) {
     const feature::Keypoints &a = first.cameras[c].keypoints, &b = second.cameras[c].keypoints;
-    const auto& pairs = out.keypoints.emplace_back(match_frames(a, b));
+    const auto& pairs = out.keypoints.emplace_back(match_images(a, b));
     auto& bearings = out.bearings.emplace_back();
     for (const feature::DescriptorMatch& p : pairs)
       bearings.push_back({a.bearing[p.a.index()], b.bearing[p.b.index()]});
@@ -187,17 +184,9 @@ BundledFrame with_twist(BundledFrame frame, const geometry::Vector6d& twist) {
 
 }  // namespace
 
-std::vector<feature::DescriptorMatch> match_frames(const feature::Keypoints& a, const feature::Keypoints& b) {
-  const double min_cosine = std::cos(kWindow);
-  const auto in_window = [&](std::size_t i, std::size_t j) {
-    return std::abs(a.level[i] - b.level[j]) <= 1 && a.bearing[i].dot(b.bearing[j]) >= min_cosine;
-  };
-  return feature::mutual_matches(a.descriptor, b.descriptor, kMaxHamming, kRatio, in_window);
-}
-
 bool comparable(const BundledFrame& first, const BundledFrame& second, const InitialisationOptions& options) {
   for (std::size_t c = 0; c < first.cameras.size(); ++c) {
-    const auto pairs = match_frames(first.cameras[c].keypoints, second.cameras[c].keypoints);
+    const auto pairs = match_images(first.cameras[c].keypoints, second.cameras[c].keypoints);
     if (pairs.size() >= static_cast<std::size_t>(options.min_monocular)) return true;
   }
   return false;

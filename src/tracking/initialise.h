@@ -5,7 +5,6 @@
 #include <optional>
 
 #include "estimators/relative_pose.h"
-#include "feature/descriptor_matching.h"
 #include "tracking/make_keyframe.h"
 
 namespace bslam::tracking {
@@ -26,9 +25,6 @@ struct StartedMap {
 // metric depth.
 std::optional<StartedMap> initialise_metric(const frame::BundledFrame& frame, std::span<const image::Pyramid> pyramids,
                                             const InitialisationOptions& options, map::MapDraft& draft);
-
-// Matches of one camera between two frames.
-std::vector<feature::DescriptorMatch> match_frames(const feature::Keypoints& a, const feature::Keypoints& b);
 
 // Returns true if some camera has enough matches between the two frames to attempt a monocular initialisation.
 bool comparable(const frame::BundledFrame& first, const frame::BundledFrame& second,

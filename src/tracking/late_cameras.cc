@@ -2,12 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 
 #include "base/median.h"
 #include "frame/capture_times.h"
 #include "solver/pose_solver.h"
-#include "tracking/initialise.h"
+#include "tracking/image_matches.h"
 #include "tracking/track.h"
 
 namespace bslam::tracking {
@@ -27,7 +26,7 @@ using Track = std::vector<TimedPose>;
 // The pose of the camera at another image, from the points.
 std::optional<SE3> estimated_pose(const camera::Rig& rig, const TwoImages& images, const CameraFrame& image) {
   std::vector<solver::PoseObservation> observations;
-  for (const auto& m : match_frames(images.first.keypoints, image.keypoints)) {
+  for (const auto& m : match_images(images.first.keypoints, image.keypoints)) {
     const auto& point = images.points[m.a.index()];
     const std::size_t k = m.b.index();
     if (point)
@@ -70,8 +69,8 @@ Track track_of(const camera::Rig& rig, const TwoImages& images, std::span<const 
   }
   out.push_back({images.second.time_ns, images.T_second_first});
   std::ranges::sort(out, {}, &TimedPose::time_ns);
-  const auto [begin, end] = std::ranges::unique(out, {}, &TimedPose::time_ns);
-  out.erase(begin, end);
+  const auto same_time = [](const TimedPose& a, const TimedPose& b) { return a.time_ns == b.time_ns; };
+  out.erase(std::unique(out.begin(), out.end(), same_time), out.end());
   return out;
 }
 
@@ -134,9 +133,8 @@ std::vector<const CameraFrame*> images_of(std::size_t other, const TwoImages& im
   for (const BundledFrame* frame : frames) {
     const CameraFrame& image = frame->cameras[other];
     if (image.keypoints.empty()) continue;
-    if (!frame->cameras[images.camera.index()].keypoints.empty() &&
-        !captured_apart(*frame, other, images.camera.index()))
-      return {};
+    const bool both = !frame->cameras[images.camera.index()].keypoints.empty();
+    if (both && !frame::captured_apart(*frame, CameraIndex(other), images.camera)) return {};
     if (between(images, image.time_ns)) out.push_back(&image);
   }
   return some_of(out, kImages);
@@ -162,23 +160,17 @@ void append_observations(const camera::Rig& rig, const TwoImages& images, const 
 
 }  // namespace
 
-bool captured_apart(const BundledFrame& frame, std::size_t i, std::size_t j) {
-  return !frame.cameras[i].keypoints.empty() && !frame.cameras[j].keypoints.empty() &&
-         !frame::can_be_compared(frame, CameraIndex(i), CameraIndex(j));
-}
-
 bool at_rest(const BundledFrame& first, const BundledFrame& second) {
   constexpr double kSame_px = 0.5;
   constexpr std::size_t kMinMatches = 50;
   const double passed_s = to_seconds(second.time_ns - first.time_ns);
-  const std::vector<double> delays = frame::delays_of(second);
-  const double later_s = std::ranges::max(delays) - std::ranges::min(delays);
+  const double later_s = frame::capture_span_s(second);
   if (passed_s <= 0.0 || passed_s > kMaxPrediction_s || later_s <= to_seconds(frame::kTogetherNs)) return false;
   bool some = false;
   for (std::size_t c = 0; c < second.cameras.size(); ++c) {
     const feature::Keypoints &a = first.cameras[c].keypoints, &b = second.cameras[c].keypoints;
     std::vector<double> moved;
-    for (const auto& m : match_frames(a, b))
+    for (const auto& m : match_images(a, b))
       moved.push_back((a.pixel[m.a.index()] - b.pixel[m.b.index()]).cast<double>().norm());
     if (moved.size() < kMinMatches) continue;
     some = true;

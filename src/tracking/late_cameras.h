@@ -12,9 +12,6 @@
 
 namespace bslam::tracking {
 
-// Returns true if both cameras have keypoints, but captured at different times between which the motion is not known.
-bool captured_apart(const frame::BundledFrame& frame, std::size_t i, std::size_t j);
-
 // Returns true if cameras of the second frame captured at different times, but the images of each camera hardly changed
 // since the first one, shortly before, so that they can be compared all the same.
 bool at_rest(const frame::BundledFrame& first, const frame::BundledFrame& second);

@@ -1,5 +1,6 @@
 // Initialisation of a map by the tracker, if there is no map or the rig cannot be located in it.
 #include "base/stopwatch.h"
+#include "frame/capture_times.h"
 #include "map/keyframe_landmarks.h"
 #include "matching/bundling.h"
 #include "tracking/late_cameras.h"
@@ -60,8 +61,9 @@ bool from_other_cameras(const BundledFrame& a, const BundledFrame& b) {
 bool views_in_common(const camera::Rig& rig, std::span<const std::uint8_t> gone, const BundledFrame& frame,
                      std::span<const std::shared_ptr<const BundledFrame>> before) {
   const auto apart = [&](std::size_t i, std::size_t j) {
-    return captured_apart(frame, i, j) ||
-           std::ranges::any_of(before, [&](const auto& f) { return captured_apart(*f, i, j); });
+    const CameraIndex a(i), b(j);
+    return frame::captured_apart(frame, a, b) ||
+           std::ranges::any_of(before, [&](const auto& f) { return frame::captured_apart(*f, a, b); });
   };
   for (std::size_t i = 0; i < rig.size(); ++i) {
     for (std::size_t j = i + 1; j < rig.size(); ++j) {

@@ -53,5 +53,14 @@ TEST(CaptureTimes, KeepsTheOnlyOverlappingViews) {
   EXPECT_EQ(without_late_cameras(rig, taken_at({0, 15 * kMs}), Flags(2, 0)), Flags(2, 0));
 }
 
+TEST(CaptureTimes, SpanIsFromTheFirstToTheLastImage) {
+  BundledFrame frame;
+  frame.time_ns = 100 * kMs;
+  frame.cameras.resize(3);
+  const TimeNs times[] = {100 * kMs, 90 * kMs, 105 * kMs};
+  for (std::size_t c = 0; c < 3; ++c) frame.cameras[c].time_ns = times[c];
+  EXPECT_NEAR(capture_span_s(frame), 0.015, 1e-12);
+}
+
 }  // namespace
 }  // namespace bslam::frame

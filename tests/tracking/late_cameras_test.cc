@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "frame/capture_times.h"
 #include "matching/bundling.h"
 #include "tracking/initialise.h"
 #include "tracking/simulated_tracker.h"
@@ -78,9 +79,9 @@ TEST_F(LateCameras, WithoutTheirImagesNoMapIsStartedThatNeedsItsScale) {
 
 TEST_F(LateCameras, CaptureApartWhileTheMotionIsUnknown) {
   BundledFrame frame = seen(0).frame;
-  EXPECT_TRUE(captured_apart(frame, 0, 1));
+  EXPECT_TRUE(frame::captured_apart(frame, CameraIndex(0), CameraIndex(1)));
   frame.motion_unknown = false;
-  EXPECT_FALSE(captured_apart(frame, 0, 1));
+  EXPECT_FALSE(frame::captured_apart(frame, CameraIndex(0), CameraIndex(1)));
 }
 
 TEST_F(LateCameras, CanBeComparedIfTheRigRests) {
