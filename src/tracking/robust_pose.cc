@@ -88,7 +88,11 @@ class PoseChoice {
     if (!other.ok) return;
     const Support of_other = support_of(other);
     candidates_.push_back({std::move(other), of_other});
-    if (!best().ok || clearly_better(candidates_.back())) best_ = candidates_.size() - 1;
+    if (!best().ok) best_ = candidates_.size() - 1;
+    // Of three motions, each changes the comparison of the other two.
+    for (std::size_t k = candidates_.size(); k-- > 0;) {
+      if (k != best_ && candidates_[k].solution.ok && clearly_better(candidates_[k])) best_ = k;
+    }
   }
 
   const solver::PoseSolution& best() const { return candidates_[best_].solution; }
@@ -167,9 +171,26 @@ class PoseChoice {
     const double ratio = extent(of_other) / extent(of_best);
     if (!(ratio >= kWider || ratio <= 1.0 / kWider)) return 1.0;  // also if both extents are zero
     // Outliers that are no motion agree with another pose by chance, and are spread widely.
-    const auto outliers = static_cast<double>(std::ranges::count(best().inlier, std::uint8_t{0}));
+    const auto outliers = static_cast<double>(outliers_but_for_third_motions(other));
     if (ratio > 1.0 && static_cast<double>(of_other.size()) < kFractionOfOutliers * outliers) return 1.0;
     return std::clamp(ratio, 1.0 / kMaxWider, kMaxWider);
+  }
+
+  // The number of outliers of the best pose, without those that show a motion which is neither this one nor the other.
+  std::size_t outliers_but_for_third_motions(const solver::PoseSolution& other) const {
+    std::vector<std::uint8_t> outlier(best().inlier.size());
+    for (std::size_t i = 0; i < outlier.size(); ++i) outlier[i] = best().inlier[i] == 0;
+    for (const Candidate& third : candidates_) {
+      const std::vector<std::uint8_t>& inlier = third.solution.inlier;
+      std::size_t of_third = 0;
+      for (std::size_t i = 0; i < inlier.size(); ++i)
+        of_third += inlier[i] != 0 && best().inlier[i] == 0 && other.inlier[i] == 0;
+      if (!is_motion(of_third, third.solution)) continue;
+      for (std::size_t i = 0; i < inlier.size(); ++i) {
+        if (inlier[i] != 0 && other.inlier[i] == 0) outlier[i] = 0;
+      }
+    }
+    return static_cast<std::size_t>(std::ranges::count(outlier, std::uint8_t{1}));
   }
 
   // Whether another pose and the best one are those of two motions, by the numbers of inliers of each that are not

@@ -276,6 +276,35 @@ TEST_F(RobustPose, FollowsLandmarksThatSpreadInSpace) {
   EXPECT_LT(error(solution), 0.005);
 }
 
+// Two people near the rig, each with more than twice as many landmarks as the scene behind them. All landmarks are new.
+TEST_F(RobustPose, FollowsTheSceneBehindTwoMovingObjects) {
+  const Eigen::Vector3d of_people[] = {{0.04, 0.01, -0.03}, {0.12, 0.03, -0.09}};
+  std::vector<solver::PoseObservation> kept;
+  FrameMatches new_ones(matches.size());
+  std::size_t i = 0;
+  for (std::size_t c = 0; c < matches.size(); ++c) {
+    for (const Match& m : matches[c]) {
+      solver::PoseObservation o = observations[i++];
+      if (!few_observations(m)) continue;
+      const int part = m.landmark.value() % 12;
+      if (part < 10) {
+        const geometry::SE3 T_cam_world = world.map.rig().cam_from_rig(o.camera) * truth;
+        o.point_world = T_cam_world.inverse() * (0.2 * (T_cam_world * o.point_world));
+        move(of_people[part < 6 ? 0 : 1], o);
+      }
+      kept.push_back(o);
+      new_ones[c].push_back(m);
+    }
+  }
+  matches = new_ones;
+  observations = kept;
+  const geometry::SE3 predicted = truth.perturbed((geometry::Vector6d() << 0, 1e-3, 0, 0.002, 0, 0.001).finished());
+  EXPECT_GT(error(solver::solve_pose(world.map.rig(), observations, predicted, motion, {})), 0.03);
+  const auto solution = pose(predicted);
+  ASSERT_TRUE(solution.ok);
+  EXPECT_LT(error(solution), 0.01);
+}
+
 // Most matches are replaced by wrong ones, which are anywhere in a window of this radius around the right pixel.
 TEST_F(RobustPose, FewRightMatchesConfirmAPoseAndWrongOnesDoNot) {
   constexpr double kWindow_px = 8.0;
