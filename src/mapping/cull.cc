@@ -49,20 +49,46 @@ bool redundant(const map::BundledMap& map, KeyframeId k, const CullingOptions& o
   return static_cast<double>(possible) > needed;
 }
 
+// Counts keyframes back from the newest one, per camera.
+class KeyframesSince {
+ public:
+  KeyframesSince(const map::BundledMap& map, KeyframeId newest) : map_(map), next_(newest), counts_(map.rig().size()) {}
+
+  // The number of keyframes after `born` that have keypoints of the camera, or have been removed. `born` must not be
+  // later than in the call before.
+  int with_images_of(CameraIndex camera, KeyframeId born) {
+    for (; next_ > born; next_ = KeyframeId(next_.value() - 1)) {
+      for (std::size_t c = 0; c < counts_.size(); ++c)
+        counts_[c] += !map_.alive(next_) || !map_.keyframe(next_).frame->cameras[c].keypoints.empty();
+    }
+    return counts_[camera.index()];
+  }
+
+ private:
+  const map::BundledMap& map_;
+  KeyframeId next_;  // the newest one that has not been counted
+  std::vector<int> counts_;
+};
+
 }  // namespace
 
 void cull_landmarks(KeyframeId newest, const CullingOptions& options, map::MapDraft& draft) {
+  constexpr int kLongest = 4;  // times the probation, for landmarks of cameras that few keyframes have images of
   const map::BundledMap& map = draft.map();
   // Landmark ids are in order of creation, so the recent landmarks are at the end.
   std::vector<LandmarkId> bad;
+  KeyframesSince since(map, newest);
   for (std::size_t i = map.landmark_slots(); i-- > 0;) {
     const LandmarkId id(i);
     const map::Landmark& l = map.landmark(id);
     if (!l.alive) continue;
     const int age = newest.value() - l.born.value();
-    if (age > options.probation) break;
+    if (age > kLongest * options.probation) break;
+    const int seen = since.with_images_of(l.reference.keypoint.camera, l.born);
+    if (seen > options.probation) continue;
     const bool rarely_matched = l.expected > 3 && l.found < options.min_found_ratio * l.expected;
-    const bool few_keypoints = age >= options.probation && num_keypoints(map, id) < options.min_keypoints;
+    const bool ends = seen == options.probation || age == kLongest * options.probation;
+    const bool few_keypoints = ends && num_keypoints(map, id) < options.min_keypoints;
     if (rarely_matched || few_keypoints) bad.push_back(id);
   }
   for (const LandmarkId l : bad) draft.remove_landmark(l);

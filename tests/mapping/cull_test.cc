@@ -71,6 +71,38 @@ TEST_F(Cull, KeepsLandmarksOlderThanTheProbation) {
   EXPECT_TRUE(d.map().alive(old));
 }
 
+// Camera 1 has an image in every third keyframe only, as one with a lower rate.
+TEST_F(Cull, ProbationCountsKeyframesWithImagesOfTheCamera) {
+  const KeyframeId k = add_keyframe();
+  const FeatureId last(static_cast<std::int32_t>(map.keyframe(k).frame->bundled.size()) - 1);
+  const LandmarkId of_0 = add_landmark({{k, monocular(0)}}), of_1 = add_landmark({{k, last}});
+  ASSERT_EQ(map.landmark(of_1).reference.keypoint.camera, CameraIndex(1));
+  for (int age = 1; age <= 9; ++age) {
+    auto frame = std::make_shared<frame::BundledFrame>(*map::synthetic_frame(random, 2, kKeypoints, kMatched));
+    if (age % 3 != 0) frame->cameras[1].keypoints = {};
+    map.add_keyframe(frame, map::random_pose(random, 0.5), {}, map.newest_keyframe());
+    map::MapDraft d = draft();
+    cull_landmarks(map.newest_keyframe(), options, d);
+    EXPECT_EQ(d.map().alive(of_0), age != 3) << age;
+    EXPECT_EQ(d.map().alive(of_1), age != 9) << age;
+  }
+}
+
+// A camera that has failed.
+TEST_F(Cull, ProbationEndsWithoutFurtherImages) {
+  const KeyframeId k = add_keyframe();
+  const FeatureId last(static_cast<std::int32_t>(map.keyframe(k).frame->bundled.size()) - 1);
+  const LandmarkId of_1 = add_landmark({{k, last}});
+  for (int age = 1; age <= 4 * options.probation; ++age) {
+    auto frame = std::make_shared<frame::BundledFrame>(*map::synthetic_frame(random, 2, kKeypoints, kMatched));
+    frame->cameras[1].keypoints = {};
+    map.add_keyframe(frame, map::random_pose(random, 0.5), {}, map.newest_keyframe());
+    map::MapDraft d = draft();
+    cull_landmarks(map.newest_keyframe(), options, d);
+    EXPECT_EQ(d.map().alive(of_1), age < 4 * options.probation) << age;
+  }
+}
+
 // Keyframes 0 ... 5 all observe the same landmarks on the same levels.
 class CullKeyframes : public Cull {
  protected:
