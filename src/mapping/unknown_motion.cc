@@ -3,7 +3,8 @@
 namespace bslam::mapping {
 namespace {
 
-constexpr double kMaxInterval_s = 0.5;  // longest interval in which the velocity is assumed to change linearly
+constexpr double kMaxLinear_s = 0.5;    // longest interval in which the velocity is assumed to change linearly
+constexpr double kMaxInterval_s = 1.5;  // longest interval of which the mean velocity is closer to it than zero
 
 }  // namespace
 
@@ -16,7 +17,7 @@ void complete_motion_of_root(KeyframeId following, map::MapDraft& draft) {
   const double interval_s = to_seconds(second.frame->time_ns - first.frame->time_ns);
   if (!(interval_s > 0 && interval_s <= kMaxInterval_s)) return;
   const geometry::Vector6d mean = (second.T_rig_world * first.T_rig_world.inverse()).log() / interval_s;
-  draft.set_twists({{root, 2 * mean - second.twist}});
+  draft.set_twists({{root, interval_s <= kMaxLinear_s ? (2 * mean - second.twist).eval() : mean}});
 }
 
 }  // namespace bslam::mapping

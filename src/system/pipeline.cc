@@ -112,7 +112,7 @@ tracking::TrackOutcome Pipeline::track(const image::ImageBundle& images, const t
 
 // Removes the images of a frame that repeat those of the frame before although the rig moves.
 bool Pipeline::drop_repeated(const map::BundledMap& map, tracking::ImageFaults& faults, BundledFrame& frame) {
-  state_.stalled = tracker_.stalled(state_, faults.repeated, map);
+  tracker_.note_repetition(faults.repeated, frame.time_ns, map, state_);
   if (!state_.stalled) return false;
   std::ranges::replace(faults.outage, tracking::CameraReason::kNone, tracking::CameraReason::kFrozen);
   frame = frame::without_images(frame);

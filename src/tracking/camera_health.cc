@@ -12,9 +12,11 @@
 namespace bslam::tracking {
 namespace {
 
-constexpr int kMaxMissedFrames = 10;  // frames without an image of a working camera with a lower rate than the others
-constexpr int kMaxRepeated = 4;       // identical images in a row that a slow camera's driver may insert
-constexpr int kSampleStep = 4;        // only every fourth row and column is used to measure brightness
+// Frames and time without an image of a working camera with a lower rate than the others, if both are exceeded.
+constexpr int kMaxMissedFrames = 10;
+constexpr double kMaxMissed_s = 0.5;
+constexpr int kMaxRepeated = 4;  // identical images in a row that a slow camera's driver may insert
+constexpr int kSampleStep = 4;   // only every fourth row and column is used to measure brightness
 
 std::uint64_t mixed(std::uint64_t hash, std::uint64_t value) {
   return std::rotl(hash ^ value, 27) * 0x9e3779b97f4a7c15ull;
@@ -114,10 +116,13 @@ ImageFaults CameraMonitor::examine(const image::ImageBundle& images, ThreadPool&
   faults.blurred = find_blurred(health);
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
     const CameraReason outage = faults.outage[c];
-    int& missed = cameras_[c].missed;
-    missed = outage == CameraReason::kNoImages ? missed + 1 : 0;
-    faults.failing.push_back(outage == CameraReason::kNoImages ? missed > kMaxMissedFrames
-                                                               : outage != CameraReason::kNone);
+    Camera& camera = cameras_[c];
+    const bool missing = outage == CameraReason::kNoImages;
+    camera.missed = missing ? camera.missed + 1 : 0;
+    if (!missing) camera.last_image_ns = images.time_ns;
+    const double missing_s = to_seconds(images.time_ns - camera.last_image_ns);
+    faults.failing.push_back(missing ? camera.missed > kMaxMissedFrames && missing_s > kMaxMissed_s
+                                     : outage != CameraReason::kNone);
   }
   return faults;
 }

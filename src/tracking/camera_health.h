@@ -70,10 +70,10 @@ class CameraMonitor {
 
   // Per camera, why it is not used in this frame. An image is frozen if it is identical to the previous image of its
   // camera while the image of another camera has changed. If all images are identical, the rig may be at rest: see
-  // ImageFaults::repeated and Tracker::stalled. After a few identical images, as of a driver that repeats the images of
-  // a slow camera, the next one is used at once. A camera without an image is not used in that frame, and used again
-  // with its next image. If all other cameras are out as well, a camera with a good image is used immediately. If no
-  // image is good, the cameras whose images are only partly over-exposed are used.
+  // ImageFaults::repeated and Tracker::note_repetition. After a few identical images, as of a driver that repeats the
+  // images of a slow camera, the next one is used at once. A camera without an image is not used in that frame, and
+  // used again with its next image. If all other cameras are out as well, a camera with a good image is used
+  // immediately. If no image is good, the cameras whose images are only partly over-exposed are used.
   std::vector<CameraReason> find_outages(const Health& images, bool& repeated);
   void admit_if_none_is_left(const Health& images, std::vector<CameraReason>& found);
   // Per camera: whether it is out of focus or smeared, determined from the slope of the edges in its image. Rows and
@@ -90,6 +90,7 @@ class CameraMonitor {
     bool blurred = false;
     int sharp = 0;   // consecutive sharp images
     int missed = 0;  // frames since its last image
+    TimeNs last_image_ns = 0;
   };
   const HealthOptions options_;
   std::vector<Camera> cameras_;

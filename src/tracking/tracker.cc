@@ -163,10 +163,20 @@ std::vector<int> Tracker::budgets(const FrontEndState& state, std::span<const st
   return out;
 }
 
-bool Tracker::stalled(const FrontEndState& state, bool repeated, const map::BundledMap& map) const {
-  constexpr double kMoving_px = 1.0;
-  if (!repeated || state.stalled) return repeated;
-  return is_tracking(state.track.status) && image_motion_px(map, state.track) > kMoving_px;
+void Tracker::note_repetition(bool repeated, TimeNs time_ns, const map::BundledMap& map, FrontEndState& state) const {
+  constexpr double kVisible_px = 1.0;
+  constexpr double kAtRest_px = 0.1;  // between two frames; less is noise
+  if (!repeated) {
+    state.stalled = false;
+    state.new_images_ns = time_ns;
+    state.speed_before_px_s.reset();
+    return;
+  }
+  if (!state.speed_before_px_s) {
+    const double moved = is_tracking(state.track.status) ? image_motion_px(map, state.track) : 0.0;
+    state.speed_before_px_s = moved > kAtRest_px ? moved / state.track.twist_interval_s : 0.0;
+  }
+  state.stalled |= *state.speed_before_px_s * to_seconds(time_ns - state.new_images_ns) > kVisible_px;
 }
 
 bool Tracker::tracks_directly(const FrontEndState& state) const {

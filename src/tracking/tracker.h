@@ -88,7 +88,9 @@ struct FrontEndState {
   bool keyframe_failed = false;
   int rig_checks = 0, rig_corrections = 0;  // before a map is started: frames since the last check, corrections so far
   int reduction = 0;                        // level of tracking/reduced_work.h
-  bool stalled = false;                     // the last frame had the images of an earlier one; see Tracker::stalled
+  bool stalled = false;      // the last frame had the images of an earlier one; see Tracker::note_repetition
+  TimeNs new_images_ns = 0;  // time of the last frame with new images
+  std::optional<double> speed_before_px_s;  // median speed of the landmarks in the images before they were repeated
   int frames_lost = 0;                      // consecutive lost frames with features
   TimeNs lost_since_ns = 0;                 // time of the first of them
   geometry::SE3 T_rig_odom, T_map_odom;
@@ -147,11 +149,11 @@ class Tracker {
   // more.
   FramePlan plan(const image::ImageBundle& images, const ImageFaults& faults, FrontEndState& state) const;
 
-  // Whether the images of a frame that repeats those of the frame before (`repeated`, see ImageFaults) are to be
-  // ignored. The landmarks moved in the images until then, and an image cannot stop in one frame: a driver delivers an
-  // earlier image again, or a video was converted to a higher frame rate. If the rig was at rest, the images are used:
-  // simulated ones have no noise, and a video coder may remove it.
-  bool stalled(const FrontEndState& state, bool repeated, const map::BundledMap& map) const;
+  // Decides whether the images of a frame that repeats those of the frame before (`repeated`, see ImageFaults) are to
+  // be ignored (FrontEndState::stalled). The landmarks moved in the images until then, so that they would have moved
+  // visibly in the meantime: a driver delivers an earlier image again, or a video was converted to a higher frame rate.
+  // If the rig was at rest, the images are used: simulated ones have no noise, and a video coder may remove it.
+  void note_repetition(bool repeated, TimeNs time_ns, const map::BundledMap& map, FrontEndState& state) const;
 
   // Forgets the frames of a monocular initialisation, for example because they have bearings of another calibration.
   static void restart_monocular_start(FrontEndState& state);

@@ -58,7 +58,10 @@ TEST(CaptureTimes, SpanIsFromTheFirstToTheLastImage) {
   frame.time_ns = 100 * kMs;
   frame.cameras.resize(3);
   const TimeNs times[] = {100 * kMs, 90 * kMs, 105 * kMs};
-  for (std::size_t c = 0; c < 3; ++c) frame.cameras[c].time_ns = times[c];
+  for (std::size_t c = 0; c < 3; ++c) {
+    frame.cameras[c].state = image::ImageState::kPresent;
+    frame.cameras[c].time_ns = times[c];
+  }
   EXPECT_NEAR(capture_span_s(frame), 0.015, 1e-12);
 }
 

@@ -45,10 +45,16 @@ TEST_F(UnknownMotion, IsExtrapolatedFromTheNextKeyframe) {
   EXPECT_TRUE(root_twist(next).isApprox(twist_at(0), 1e-9));
 }
 
+// At three frames per second, keyframes are that far apart.
+TEST_F(UnknownMotion, IsTheMeanOneIfTheNextKeyframeIsFartherAway) {
+  const KeyframeId root = add(0, 10'000'000, {}), next = add(4 * kInterval, 10'000'000, root);
+  EXPECT_TRUE(root_twist(next).isApprox(twist_at(0.4), 1e-9));
+}
+
 TEST_F(UnknownMotion, StaysIfItDoesNotMatterOrTheNextKeyframeIsFar) {
   const KeyframeId root = add(0, 0, {}), next = add(kInterval, 0, root);
   EXPECT_TRUE(root_twist(next).isZero(0));
-  const KeyframeId late_root = add(0, 10'000'000, {}), far = add(3 * kInterval, 10'000'000, late_root);
+  const KeyframeId late_root = add(0, 10'000'000, {}), far = add(8 * kInterval, 10'000'000, late_root);
   EXPECT_TRUE(root_twist(far).isZero(0));
 }
 

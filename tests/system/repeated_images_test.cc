@@ -33,6 +33,20 @@ TEST(RepeatedImages, OfAMovingRigGiveNoPoseAndTrackingContinuesAfterThem) {
   EXPECT_LT(ate_m(final_poses(system), tour.truth()), 0.01);
 }
 
+// Between two frames the landmarks move by less than a pixel.
+TEST(RepeatedImages, OfASlowRigGiveNoPoseOnceItWouldHaveMovedVisibly) {
+  const RenderedTour tour(2, 40, [](const simulator::Building& building, double duration_s) {
+    return simulator::make_tour(building, {.duration_s = duration_s, .speed_mps = 0.1, .seed = 3});
+  });
+  std::vector<image::ImageBundle> frames = tour.frames();
+  for (std::size_t k = kFirst; k < frames.size(); ++k) repeat(frames[kFirst - 1], frames[k]);
+  System system(tour.rig(), small_config(execution::Mode::kSequential));
+  std::vector<FrameRecord> records;
+  for (const image::ImageBundle& images : frames) records.push_back(must_process(system, images));
+  EXPECT_EQ(records[kFirst].result.status, TrackStatus::kTracking) << "as if the rig stopped";
+  EXPECT_EQ(records.back().result.reason, LostReason::kNoImages);
+}
+
 // A video that was converted to twice its frame rate, after some frames from which the motion is known.
 TEST(RepeatedImages, EverySecondOneIsIgnored) {
   const RenderedTour tour(2, 40);
