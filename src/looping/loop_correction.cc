@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <queue>
 
 #include "base/median.h"
 #include "looping/essential_graph.h"
@@ -51,19 +53,36 @@ double relative_distance(const map::BundledMap& map, const PlaceMatch& place_mat
   return (here - centre(map.keyframe(place_match.matched_keyframe).T_rig_world)).norm() / median(std::move(distances));
 }
 
-// Length of the path between two keyframes through all keyframes of their submap created in between.
-double path_length(const map::BundledMap& map, KeyframeId from, KeyframeId to) {
-  const std::vector<KeyframeId> root = map.root_of_each();
-  double length = 0;
-  Vector3d last = centre(map.keyframe(from).T_rig_world);
-  for (std::size_t i = from.index() + 1; i <= to.index(); ++i) {
-    const KeyframeId k(i);
-    if (!map.alive(k) || root[i] != root[to.index()]) continue;
-    const Vector3d next = centre(map.keyframe(k).T_rig_world);
-    length += (next - last).norm();
-    last = next;
+// Length of the shortest way between two keyframes of a submap along the edges of its essential graph. Drift
+// accumulates along it: where the submap is already joined by common landmarks, the way is short.
+double way_between(const map::BundledMap& map, KeyframeId from, KeyframeId to, int edge_weight) {
+  struct Edge {
+    std::size_t to;
+    double length;
+  };
+  struct Reached {
+    double length;
+    std::size_t vertex;
+    bool operator>(const Reached& other) const { return length > other.length; }
+  };
+  const EssentialGraph graph = essential_graph(map, map.root_of(to), edge_weight);
+  std::vector<std::vector<Edge>> edges(graph.keyframes.size());
+  for (const PoseGraphProblem::Edge& e : graph.problem.edges) {
+    const double length = e.S_a_b.translation().norm();
+    edges[static_cast<std::size_t>(e.a)].push_back({static_cast<std::size_t>(e.b), length});
+    edges[static_cast<std::size_t>(e.b)].push_back({static_cast<std::size_t>(e.a), length});
   }
-  return length;
+  std::vector<double> shortest(graph.keyframes.size(), std::numeric_limits<double>::infinity());
+  std::priority_queue<Reached, std::vector<Reached>, std::greater<>> next;
+  next.push({0.0, static_cast<std::size_t>(graph.vertex(from))});
+  while (!next.empty()) {
+    const Reached r = next.top();
+    next.pop();
+    if (r.length >= shortest[r.vertex]) continue;
+    shortest[r.vertex] = r.length;
+    for (const Edge& e : edges[r.vertex]) next.push({r.length + e.length, e.to});
+  }
+  return shortest[static_cast<std::size_t>(graph.vertex(to))];
 }
 
 // The keyframe and its best covisible keyframes: they are moved together and fused with the place.
@@ -209,11 +228,12 @@ LoopClosure measure(const map::BundledMap& map, KeyframeId keyframe, const Place
 
 bool plausible(const map::BundledMap& map, const LoopClosure& closure, const LoopOptions& options) {
   if (closure.merged) return true;
-  const auto [first, last] = std::minmax(closure.keyframe, closure.matched_keyframe);
+  if (closure.relative_distance > options.max_distance_over_depth || closure.rotation_correction > kMaxRotation)
+    return false;
   const double share = map.scale() == map::Scale::kMetric ? options.max_drift : options.max_drift_free;
-  const double way = path_length(map, first, last) + map::median_depth(map, closure.keyframe);
-  return closure.relative_distance <= options.max_distance_over_depth &&
-         closure.translation_correction <= share * way && closure.rotation_correction <= kMaxRotation;
+  const double way = way_between(map, closure.keyframe, closure.matched_keyframe, options.edge_weight) +
+                     map::median_depth(map, closure.keyframe);
+  return closure.translation_correction <= share * way;
 }
 
 void merge_submaps(const LoopClosure& closure, const PlaceMatch& place_match, const LoopOptions& options,

@@ -92,6 +92,17 @@ TEST_P(CloseLoopRig, MeasuresTheDrift) {
   EXPECT_FALSE(plausible(world.map, closure, strict));
 }
 
+// A look-alike place, to which the drift of a lap may lead, but not that since the loop was closed.
+TEST_P(CloseLoopRig, OnceClosedALargeCorrectionIsAFalseMatch) {
+  double lap_m = 0;
+  for (int k = 1; k <= kLast.value(); ++k)
+    lap_m += distance_m(world.truth(KeyframeId(k)), world.truth(KeyframeId(k - 1)));
+  LoopClosure far{.keyframe = kLast, .matched_keyframe = KeyframeId(1)};
+  far.translation_correction = 0.8 * LoopOptions().max_drift * lap_m;
+  EXPECT_TRUE(plausible(world.map, far, {}));
+  EXPECT_FALSE(plausible(draft.map(), far, {})) << lap_m;
+}
+
 TEST_P(CloseLoopRig, ReducesThePoseErrors) {
   for (const KeyframeId k : {kLast, KeyframeId(kLast.value() - 1), KeyframeId(kLast.value() - 4)}) {
     EXPECT_LT(5 * error_of(world, draft.map(), k), error_of(world, world.map, k));
