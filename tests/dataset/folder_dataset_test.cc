@@ -314,6 +314,19 @@ TEST_F(ImageFolders, ListsMayHavePathsAndNameImagesThatAreNotThere) {
   EXPECT_TRUE(has_text(dataset->warnings, "front/000002.png"));
 }
 
+TEST_F(ImageFolders, OneListMayNameTheImagesOfAllCamerasInOrderOfTime) {
+  for (const char* name : {"front", "rear"}) add(name, numbered);
+  std::string times;
+  for (int k = 0; k < kImages; ++k) {
+    for (const char* name : {"front/", "rear/"}) times += "100." + std::to_string(k) + " " + name + numbered(k) + "\n";
+  }
+  support::write_text(data() / "times.txt", times);
+  const auto dataset = open({"front", "rear"});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  ASSERT_EQ(dataset->frames.size(), static_cast<std::size_t>(kImages));
+  EXPECT_EQ(dataset->frames[3].images[1]->time_ns, 100'300'000'000);
+}
+
 TEST_F(ImageFolders, OneListMayNameImagesThatAreOneFolderDeeper) {
   add("front/data", numbered);
   add("back/data", numbered);
