@@ -63,12 +63,15 @@ Result<std::vector<std::vector<image_files::ImageFile>>> collect_images(const Da
   return images;
 }
 
-// Returns the formats of the images of every camera in use, with the bits that their 16-bit files use.
+// Returns the formats of the images of every camera in use, with the bits that the 16-bit files of all of them use: the
+// same value is the same grey in every camera, also if one sees only shadow.
 std::vector<image_decoding::PixelFormat> pixel_formats(const DatasetRequest& request,
                                                        const std::vector<std::vector<image_files::ImageFile>>& images) {
   std::vector<image_decoding::PixelFormat> formats(images.size());
+  std::optional<int> bits;
+  for (const auto& of_camera : images) bits = std::max(bits, image_decoding::bits_in_use(of_camera));
   for (std::size_t i = 0; i < images.size(); ++i) {
-    formats[i].bits = image_decoding::bits_in_use(images[i]);
+    formats[i].bits = bits.value_or(formats[i].bits);
     if (!request.bayer.empty()) formats[i].bayer = request.bayer[request.bayer.size() == 1 ? 0 : i];
   }
   return formats;

@@ -174,7 +174,7 @@ std::optional<image::Image> decode_stored(const image_files::StoredImage& stored
   return without_colour_filter(*std::move(image), filter);
 }
 
-int bits_in_use(std::span<const image_files::ImageFile> images) {
+std::optional<int> bits_in_use(std::span<const image_files::ImageFile> images) {
   constexpr std::size_t kSamples = 12;
   const std::size_t count = std::min(kSamples, images.size());
   double largest = 0;
@@ -182,23 +182,24 @@ int bits_in_use(std::span<const image_files::ImageFile> images) {
     const auto stored = read_stored(images[k * images.size() / count]);
     if (!stored) continue;
     if (stored->layout != image_files::PixelLayout::kFile) {
-      if (stored->bytes_per_value != 2) return 16;
+      if (stored->bytes_per_value != 2) return std::nullopt;
       largest = std::max(largest, static_cast<double>(largest_value(*stored)));
       continue;
     }
     const std::string_view bytes = stored->bytes;
     const std::string_view file = bytes.substr(std::min(stored->begin, bytes.size()), stored->size);
     const bool png = image_files::is_complete_png(file);
-    if (is_whole_jpeg(file) || is_whole_webp(file) || (png && !is_16_bit_png(file))) return 16;
+    if (is_whole_jpeg(file) || is_whole_webp(file) || (png && !is_16_bit_png(file))) return std::nullopt;
     if (!png && !is_plain_file(file)) continue;
     const cv::Mat decoded = decode_to_grey(file);
-    if (!decoded.empty() && decoded.depth() == CV_8U) return 16;
+    if (!decoded.empty() && decoded.depth() == CV_8U) return std::nullopt;
     double value = 0;
     if (!decoded.empty()) cv::minMaxLoc(decoded, nullptr, &value);
     largest = std::max(largest, value);
   }
+  if (largest <= 0) return std::nullopt;
   for (const int bits : {8, 10, 12, 14}) {
-    if (largest > 0 && largest < static_cast<double>(1 << bits)) return bits;
+    if (largest < static_cast<double>(1 << bits)) return bits;
   }
   return 16;
 }

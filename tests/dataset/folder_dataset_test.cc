@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
 
 #include "dataset/dataset.h"
 #include "dataset/frame_reader.h"
@@ -421,6 +423,20 @@ TEST_F(ImageFolders, SecondsAreNoNumbersOfImages) {
   const auto in_seconds = open({"a"}, {}, {.unit_ns = TimeNs{1'000'000'000}});
   ASSERT_TRUE(in_seconds) << in_seconds.error().message();
   EXPECT_FALSE(has_text(in_seconds->warnings, "numbers of images"));
+}
+
+// A camera that sees only shadow is as dark as the others see it.
+TEST_F(ImageFolders, AllCamerasOfSixteenBitsHaveTheSameBitsInUse) {
+  for (const auto& [name, largest] : {std::pair("bright", 4000), std::pair("dark", 200), std::pair("covered", 0)}) {
+    add_stamped(name);
+    for (const auto& entry : fs::directory_iterator(data() / name))
+      ASSERT_TRUE(cv::imwrite(entry.path().string(), cv::Mat(20, 60, CV_16UC1, cv::Scalar(largest))));
+  }
+  add_stamped("eight");
+  const auto dataset = open({"bright", "dark", "covered", "eight"});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  ASSERT_EQ(dataset->pixel_formats.size(), 4u);
+  for (const image_decoding::PixelFormat& format : dataset->pixel_formats) EXPECT_EQ(format.bits, 12);
 }
 
 TEST_F(ImageFolders, RecordingsInOtherFoldersAreNamed) {

@@ -100,8 +100,11 @@ TEST(ImageFile, FindsTheBitsInUseOverAllImages) {
   EXPECT_EQ(bits_in_use(files), 16);
   files.clear();
   write(200, CV_8UC1);
-  EXPECT_EQ(bits_in_use(files), 16);
-  EXPECT_EQ(bits_in_use({}), 16);
+  EXPECT_EQ(bits_in_use(files), std::nullopt);
+  EXPECT_EQ(bits_in_use({}), std::nullopt);
+  files.clear();
+  write(0, CV_16UC1);  // says nothing
+  EXPECT_EQ(bits_in_use(files), std::nullopt);
 }
 
 TEST(ImageFile, ConvertsColoursOfSixteenBitsToGrey) {
