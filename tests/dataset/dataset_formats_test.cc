@@ -69,6 +69,19 @@ TEST_F(SmallKitti, WarnsOfImagesWithoutATime) {
   EXPECT_NE(dataset->warnings[0].find("1 images have no time in times.txt and are not used"), std::string::npos);
 }
 
+TEST_F(SmallKitti, OfTwoFilesWithOneNumberTheOneWithTheUsualNameIsUsed) {
+  for (const char* name : {"1.png", "000001.jpg", "00000001.png"})
+    support::write_image(data() / "image_0" / name, 9, 9);
+  fs::rename(image(2, 0), data() / "image_0" / "2.png");
+  const auto dataset = open();
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(dataset->frames[1].images[0]->path, image(1, 0));
+  EXPECT_EQ(dataset->frames[2].images[0]->path, data() / "image_0" / "2.png");
+  EXPECT_EQ(dataset->warnings, std::vector{(data() / "image_0").string() +
+                                           ": 3 images have the number of another file and are not used, the first: "
+                                           "00000001.png"});
+}
+
 TEST_F(SmallKitti, RejectsTimesThatAreNoSeconds) {
   std::string times;
   for (int k = 0; k < 10; ++k) times += std::to_string(100'000'000 * k) + "\n";
