@@ -80,10 +80,12 @@ class KittiRawRecording : public Recording {
     }
     const auto rig = rig_formats::read_rig(file);
     if (!rig) return rig.error();
-    const auto number = static_cast<std::size_t>(cameras_[camera]);
-    if (number >= rig->size())
-      return Error{file.string(), "", fmt::format("{} cameras", rig->size()), fmt::format("camera {:02}", number)};
-    return camera::RigCamera{rig->camera(number), rig->body_from_cam(number)};
+    const std::string name = folder_name(cameras_[camera]);
+    for (std::size_t c = 0; c < rig->size(); ++c) {  // the file may lack cameras
+      if (rig->camera(c).name == name) return camera::RigCamera{rig->camera(c), rig->body_from_cam(c)};
+    }
+    return Error{file.string(), "", fmt::format("{} cameras", rig->size()),
+                 fmt::format("camera {:02}", cameras_[camera])};
   }
 
   Result<image_files::ImageList> images(std::size_t camera) const override {
