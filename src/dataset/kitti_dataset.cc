@@ -108,6 +108,12 @@ class KittiRecording : public Recording {
   }
 
   bool has_times() const override { return true; }
+  std::vector<int> recorded_numbers() const override { return cameras_; }
+  std::vector<std::string> folder_names() const override {
+    std::vector<std::string> names;
+    for (const int camera : cameras_) names.push_back(rig_formats::kitti_image_folder(root_, camera).filename());
+    return names;
+  }
 
   std::optional<fs::path> ground_truth() const override {
     fs::path file = root_ / "poses.txt";

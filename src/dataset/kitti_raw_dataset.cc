@@ -68,6 +68,12 @@ class KittiRawRecording : public Recording {
 
   std::size_t camera_count() const override { return cameras_.size(); }
   bool has_times() const override { return true; }
+  std::vector<int> recorded_numbers() const override { return cameras_; }
+  std::vector<std::string> folder_names() const override {
+    std::vector<std::string> names;
+    for (const int camera : cameras_) names.push_back(folder_name(camera));
+    return names;
+  }
 
   Result<camera::RigCamera> calibration(std::size_t camera) const override {
     std::error_code error;
