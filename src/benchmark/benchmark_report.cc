@@ -72,6 +72,9 @@ std::string remark(const SequenceResult& result) {
   if (split != result.runs.end()) {
     return fmt::format("run {} ended with {} submaps; errors are of the largest", split->run, split->submaps);
   }
+  if (std::ranges::any_of(result.runs, &RunMeasurement::body_is_camera))
+    return "the calibration gives camera 0 no pose on the body other than the identity: the body is taken to be camera "
+           "0";
   return "";
 }
 

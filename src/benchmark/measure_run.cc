@@ -48,6 +48,7 @@ Status compare(const std::filesystem::path& folder, const Sequence& sequence, co
     m.ate_p_m = *error;
   }
   const Truth& best = sequence.corrected ? *sequence.corrected : *sequence.released;
+  m.body_is_camera = best.frame == TruthFrame::kBody && camera_from_body.matrix().isIdentity(0);
   const auto truth = evaluation::read_trajectory(best.file, best.times);
   if (!truth) return truth.error();
   const auto compared = [&](const Trajectory& path) {

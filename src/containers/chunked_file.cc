@@ -50,7 +50,7 @@ ChunkedFile::Loaded ChunkedFile::load(std::uint32_t index) const {
     }
   }
   const Chunk& chunk = chunks_.at(index);
-  std::string data = file_.read(chunk.at, chunk.stored_size);
+  std::string data = file_.read(chunk.at, std::min<std::uint64_t>(chunk.stored_size, kMaxChunkBytes));
   if (chunk.compression != Compression::kNone) {
     data = decompress(chunk.compression, data,
                       static_cast<std::size_t>(std::min<std::uint64_t>(chunk.size, kMaxChunkBytes)));
@@ -78,6 +78,12 @@ std::string ChunkedFile::bytes(std::uint32_t index, std::uint64_t at, std::uint6
   if (at >= loaded.data->size()) return {};
   return loaded.data->substr(static_cast<std::size_t>(at),
                              static_cast<std::size_t>(std::min<std::uint64_t>(count, loaded.data->size())));
+}
+
+std::string ChunkedFile::message_bytes(std::uint32_t index, std::uint64_t at, std::uint64_t count) const {
+  const std::uint64_t there = available(index);
+  if (count > kMaxMessageBytes || at > there || count > there - at) return {};
+  return bytes(index, at, count);
 }
 
 std::uint64_t ChunkedFile::available(std::uint32_t index) const {

@@ -46,6 +46,9 @@ class ChunkedFile : public MessageFile {
 
   // Up to `count` bytes of the decompressed chunk from position `at`.
   std::string bytes(std::uint32_t chunk, std::uint64_t at, std::uint64_t count) const;
+  // The same for the data of a message; none if the chunk does not contain all of it, or it is larger than
+  // kMaxMessageBytes: the length in a damaged file reserves no memory.
+  std::string message_bytes(std::uint32_t chunk, std::uint64_t at, std::uint64_t count) const;
   // Number of bytes of the decompressed chunk that can be read.
   std::uint64_t available(std::uint32_t chunk) const;
   // Returns false if the chunk has a checksum that differs from that of its data.

@@ -74,7 +74,9 @@ class McapFile : public ChunkedFile {
                    "data with another checksum", "the stored checksum"};
     }
     const std::uint64_t size = record->data_size - kMessageHead;
-    const auto part = [&](std::uint64_t count) { return bytes(message.chunk, record->data_at + kMessageHead, count); };
+    const auto part = [&](std::uint64_t count) {
+      return message_bytes(message.chunk, record->data_at + kMessageHead, count);
+    };
     const std::uint64_t wanted = std::min<std::uint64_t>(size, max_bytes);
     std::string data = part(wanted);
     const bool packed = is_compressed_message(data);

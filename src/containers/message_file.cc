@@ -19,7 +19,6 @@ void MessageFile::count_message(std::uint32_t topic, TimeNs received_ns, std::ui
 bool MessageFile::is_compressed_message(std::string_view bytes) { return bytes.starts_with("\x28\xb5\x2f\xfd"); }
 
 std::string MessageFile::decompressed_message(std::string_view whole, std::size_t max_bytes) {
-  constexpr std::size_t kMaxMessageBytes = std::size_t{1} << 30;
   return decompress(Compression::kZstd, whole, std::min(max_bytes, kMaxMessageBytes));
 }
 

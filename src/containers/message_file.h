@@ -41,6 +41,7 @@ struct Attachment {
 };
 
 constexpr std::size_t kWholeMessage = std::numeric_limits<std::size_t>::max();
+constexpr std::size_t kMaxMessageBytes = std::size_t{1} << 30;  // larger ones are damaged
 
 // An open file: its topics, and the positions of the messages with images and calibrations. Messages are read on
 // request.

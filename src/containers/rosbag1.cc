@@ -73,7 +73,7 @@ class RosBag1 : public ChunkedFile {
     if (topic == topic_of_.end() || topic->second != message.topic)
       return Error{path_.string(), "", "a message of another topic than the index says", "a message of the topic"};
     const std::uint64_t wanted = std::min<std::uint64_t>(record->data_size, max_bytes);
-    std::string data = bytes(message.chunk, record->data_at, wanted);
+    std::string data = message_bytes(message.chunk, record->data_at, wanted);
     if (data.size() < wanted) return Error{path_.string(), "", "a message that is cut off", "a complete message"};
     return data;
   }

@@ -70,6 +70,7 @@ class BagRecording : public Recording {
     const auto number = live_ ? live_->number_of(topics_[cameras_[camera]].name) : std::nullopt;
     return number.value_or(static_cast<int>(camera));
   }
+  std::vector<int> recorded_numbers() const override;
   Result<image_files::ImageList> images(std::size_t camera) const override;
   bool has_times() const override { return true; }
   std::vector<std::string> names_in_topics() const override;
@@ -172,10 +173,25 @@ Status BagRecording::choose_requested(const std::vector<std::string>& requested,
 
 std::vector<std::string> BagRecording::names_in_topics() const {
   std::vector<std::string> names;
+  for (const std::size_t t : cameras_) {
+    const camera::RigCamera* recorded = proposed_ && live_ ? live_->camera_of(topics_[t].name) : nullptr;
+    if (recorded) names.push_back(recorded->camera.name);
+  }
+  if (!names.empty()) return names.size() == cameras_.size() ? names : std::vector<std::string>();
   for (const std::string& topic : topics()) names.push_back(camera_name(topic));
   std::vector<std::string> out = names;
   for (std::string& name : out) {
     if (std::ranges::count(names, name) > 1) name.clear();
+  }
+  return out;
+}
+
+std::vector<int> BagRecording::recorded_numbers() const {
+  std::vector<int> out;
+  for (std::size_t c = 0; proposed_ && live_ && c < cameras_.size(); ++c) {
+    const auto number = live_->number_of(topics_[cameras_[c]].name);
+    if (!number) return {};
+    out.push_back(*number);
   }
   return out;
 }

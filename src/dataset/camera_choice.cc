@@ -16,15 +16,55 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Returns the numbers of the folders that have the names of the cameras; -1 for those without a folder.
-std::vector<int> folders_by_name(const std::vector<std::string>& folders, const camera::Rig& rig,
-                                 const std::vector<int>& cameras) {
-  std::vector<int> out;
-  for (const int camera : cameras) {
-    const auto found = std::ranges::find(folders, rig.camera(static_cast<std::size_t>(camera)).name);
-    out.push_back(found == folders.end() ? -1 : static_cast<int>(found - folders.begin()));
+// Where each camera of a rig is in a recording, by what the recording says about its cameras; -1: not in it.
+struct CameraPlaces {
+  std::vector<int> of_cameras;
+  bool by_name = false;
+
+  bool has(int camera) const { return of_cameras[static_cast<std::size_t>(camera)] >= 0; }
+};
+
+bool is_found(int place) { return place >= 0; }
+
+template <class T>
+int place_of(const T& value, const std::vector<T>& in) {
+  const auto found = std::ranges::find(in, value);
+  return found == in.end() ? -1 : static_cast<int>(found - in.begin());
+}
+
+// Returns nullopt unless a folder or topic has the name of a camera.
+std::optional<CameraPlaces> places_by_name(const DatasetRequest& request, const Recording& recording,
+                                           const camera::Rig& rig) {
+  const auto folders = request.topics.empty() ? recording.folder_names() : std::vector<std::string>();
+  for (const std::vector<std::string>& names : {folders, recording.names_in_topics()}) {
+    CameraPlaces places{.of_cameras = {}, .by_name = true};
+    for (std::size_t c = 0; c < rig.size(); ++c) places.of_cameras.push_back(place_of(rig.camera(c).name, names));
+    if (std::ranges::any_of(places.of_cameras, is_found)) return places;
   }
-  return out;
+  return std::nullopt;
+}
+
+// Returns true if the numbers may be those of the cameras of the rig: it has all of them, or it is a rig of the first
+// cameras of a recording that has all.
+bool are_numbers_in(const std::vector<int>& numbers, const camera::Rig& rig) {
+  const int largest = std::ranges::max(numbers);
+  return largest < static_cast<int>(std::max(rig.size(), numbers.size()));
+}
+
+// Returns nullopt if the recording has no numbers, or those of another rig.
+std::optional<CameraPlaces> places_by_number(const std::vector<int>& numbers, const camera::Rig& rig) {
+  if (numbers.empty() || !are_numbers_in(numbers, rig)) return std::nullopt;
+  CameraPlaces places;
+  for (std::size_t c = 0; c < rig.size(); ++c) places.of_cameras.push_back(place_of(static_cast<int>(c), numbers));
+  return places;
+}
+
+// Returns true if every camera that is found by its name is also found there by its number.
+bool agree(const CameraPlaces& by_name, const CameraPlaces& by_number) {
+  for (std::size_t c = 0; c < by_name.of_cameras.size(); ++c) {
+    if (is_found(by_name.of_cameras[c]) && by_name.of_cameras[c] != by_number.of_cameras[c]) return false;
+  }
+  return true;
 }
 
 // Text for messages: the source of the calibration.
@@ -39,13 +79,14 @@ std::string names_of(const camera::Rig& rig) {
 }
 
 // Returns true if the recording contains only the selected cameras: there is one selected camera per folder, and either
-// the recording is a single folder, or the folders were requested by name and not all selected numbers are numbers of
-// folders.
+// the recording is of a single camera that may be any, or the folders were requested in their order and not all
+// selected numbers are numbers of folders.
 bool are_those_selected(const DatasetRequest& request, const Recording& recording, const std::vector<int>& cameras) {
   const std::size_t count = recording.camera_count();
   if (request.cameras.empty() || cameras.size() != count) return false;
+  const bool requested = !request.topics.empty() || recording.in_requested_order();
   const bool others = std::ranges::any_of(cameras, [&](int c) { return static_cast<std::size_t>(c) >= count; });
-  return request.topics.empty() ? count == 1 && recording.has_own_names() : others;
+  return requested ? others : count == 1;
 }
 
 // The order of the names does not identify the cameras unless there is one name per camera.
@@ -64,6 +105,40 @@ Error unknown_order(const DatasetRequest& request, const Recording& recording, c
 Error unknown_topics(const DatasetRequest& request, const std::vector<std::string>& topics, const camera::Rig& rig) {
   return {request.path.string(), "", fmt::format("image topics {}", fmt::join(topics, ", ")),
           fmt::format("those of the {} cameras of {} ({}): name the topics in their order with --topics", rig.size(),
+                      origin_of(request), names_of(rig))};
+}
+
+// The recording has no images of `camera`. `places`: where the others are, if it says so.
+Error without_camera(const DatasetRequest& request, const Recording& recording, const camera::Rig& rig,
+                     std::size_t camera, const std::optional<CameraPlaces>& places) {
+  std::vector<std::string> names;
+  std::vector<std::size_t> numbers;
+  for (std::size_t c = 0; places && c < rig.size(); ++c) {
+    if (!is_found(places->of_cameras[c])) continue;
+    names.push_back(rig.camera(c).name);
+    numbers.push_back(c);
+  }
+  const std::size_t there = recording.camera_count();
+  const bool requested = !request.topics.empty() || recording.in_requested_order();
+  std::string remedy = fmt::format("--cameras {} selects those that it has", fmt::join(numbers, ","));
+  if (!recording.names_in_topics().empty()) remedy += ", and --topics names the topics of all cameras in their order";
+  if (!places) {
+    remedy = request.cameras.empty() ? "--cameras selects a subset"
+             : requested             ? "--cameras selects as many as there are images of, in their order"
+                                     : "--topics names the images of the selected cameras in their order";
+  }
+  return {request.path.string(), "",
+          places ? fmt::format("images of {}", fmt::join(names, ", "))
+                 : fmt::format("images of {} camera{}", there, there == 1 ? "" : "s"),
+          fmt::format("images of camera {} ({}) as well, since {} has {} cameras; {}", camera, rig.camera(camera).name,
+                      origin_of(request), rig.size(), remedy)};
+}
+
+// The numbers of the recorded cameras are not those of the rig, and there are not as many.
+Error other_numbers(const DatasetRequest& request, const std::vector<int>& numbers, const camera::Rig& rig) {
+  return {request.path.string(), "", fmt::format("images of the cameras with the numbers {}", fmt::join(numbers, ", ")),
+          fmt::format("those of the cameras of {} ({}): call these like their folders, or give the calibration of all "
+                      "cameras up to the largest number",
                       origin_of(request), names_of(rig))};
 }
 
@@ -109,32 +184,28 @@ std::optional<fs::path> rig_file_in_folder(const DatasetRequest& request) {
 
 Result<RecordedCameras> recorded_cameras(const DatasetRequest& request, const Recording& recording,
                                          const camera::Rig& rig, const std::vector<int>& cameras) {
-  const std::vector<std::string> folders =
-      request.topics.empty() ? recording.folder_names() : std::vector<std::string>();
-  const std::vector<std::string> topics = recording.topics();
-  std::vector<int> all(rig.size());
-  std::iota(all.begin(), all.end(), 0);
-  const auto is_found = [](int folder) { return folder >= 0; };
-  for (const std::vector<std::string>& names : {folders, recording.names_in_topics()}) {
-    const std::vector<int> found = folders_by_name(names, rig, cameras);
-    if (!names.empty() && std::ranges::all_of(found, is_found)) return RecordedCameras{found, true};
-  }
-  if (topics.size() > rig.size()) return unknown_topics(request, topics, rig);
-  if (are_those_selected(request, recording, cameras)) {
-    all.resize(cameras.size());
-    return RecordedCameras{all, false};
-  }
-  if (recording.has_own_names() && !folders.empty() &&
-      (folders.size() != rig.size() || std::ranges::any_of(folders_by_name(folders, rig, all), is_found)))
+  const std::vector<std::string> topics = recording.topics(), folders = recording.folder_names();
+  const std::vector<int> numbers = recording.recorded_numbers();
+  auto places = places_by_name(request, recording, rig);
+  const auto has = [&](int camera) { return places->has(camera); };
+  const bool all_named = places && std::ranges::all_of(cameras, has);
+  if (!all_named && topics.size() > rig.size()) return unknown_topics(request, topics, rig);
+  const bool only_selected = !places && numbers.empty() && are_those_selected(request, recording, cameras);
+  const bool own_names = request.topics.empty() && recording.has_own_names() && !folders.empty();
+  if (own_names && !all_named && !only_selected && (places || folders.size() != rig.size()))
     return unknown_order(request, recording, folders, rig);
+  const auto by_number = places_by_number(numbers, rig);
+  if (!all_named && by_number && (!places || agree(*places, *by_number))) places = by_number;
+  if (!places && !numbers.empty() && numbers.size() != rig.size()) return other_numbers(request, numbers, rig);
+  RecordedCameras out{.numbers = {}, .by_name = places && places->by_name};
   for (const int camera : cameras) {
-    if (static_cast<std::size_t>(camera) < recording.camera_count()) continue;
-    const std::size_t there = recording.camera_count();
-    return Error{request.path.string(), "", fmt::format("images of {} camera{}", there, there == 1 ? "" : "s"),
-                 fmt::format("images of camera {} as well, since {} has {} cameras; --cameras selects a subset", camera,
-                             origin_of(request), rig.size())};
+    const int in_order = only_selected ? static_cast<int>(out.numbers.size()) : camera;
+    const int place = places ? places->of_cameras[static_cast<std::size_t>(camera)] : in_order;
+    if (!is_found(place) || static_cast<std::size_t>(place) >= recording.camera_count())
+      return without_camera(request, recording, rig, static_cast<std::size_t>(camera), places);
+    out.numbers.push_back(place);
   }
-  return RecordedCameras{cameras, false};
+  return out;
 }
 
 Result<ChosenRig> choose_given(const DatasetRequest& request, const Recording& recording) {

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "base/lower_case.h"
+#include "base/number_text.h"
 #include "dataset/image_names.h"
 #include "rig_formats/euroc_sensor.h"
 
@@ -132,6 +133,19 @@ Result<CameraFolders> find_camera_folders(const fs::path& data, const std::vecto
     std::error_code error;
     const fs::path whole = fs::weakly_canonical(data, error);
     out.cameras.push_back({(error ? data : whole).filename().string(), data});
+  }
+  return out;
+}
+
+std::vector<int> folder_numbers(const std::vector<std::string>& names) {
+  constexpr std::string_view kCamera = "cam";
+  constexpr int kMaxNumber = 1'000'000;
+  std::vector<int> out;
+  for (const std::string& name : names) {
+    const auto number =
+        name.starts_with(kCamera) ? parse_integer(std::string_view(name).substr(kCamera.size())) : std::nullopt;
+    if (!number || *number < 0 || *number > kMaxNumber) return {};
+    out.push_back(static_cast<int>(*number));
   }
   return out;
 }

@@ -26,4 +26,7 @@ struct CameraFolders {
 // twice. No cameras if there are no images.
 Result<CameraFolders> find_camera_folders(const std::filesystem::path& data, const std::vector<std::string>& requested);
 
+// Returns the numbers N of folders called camN; empty unless all are.
+std::vector<int> folder_numbers(const std::vector<std::string>& names);
+
 }  // namespace bslam::dataset

@@ -13,6 +13,7 @@
 #include "dataset/camera_choice.h"
 #include "dataset/frame_grouping.h"
 #include "dataset/image_checks.h"
+#include "dataset/long_pause.h"
 #include "dataset/mask_folder.h"
 #include "dataset/recording.h"
 #include "dataset/vignette_folder.h"
@@ -63,12 +64,15 @@ Result<std::vector<std::vector<image_files::ImageFile>>> collect_images(const Da
   return images;
 }
 
-// Returns the formats of the images of every camera in use, with the bits that their 16-bit files use.
+// Returns the formats of the images of every camera in use, with the bits that the 16-bit files of all of them use: the
+// same value is the same grey in every camera, also if one sees only shadow.
 std::vector<image_decoding::PixelFormat> pixel_formats(const DatasetRequest& request,
                                                        const std::vector<std::vector<image_files::ImageFile>>& images) {
   std::vector<image_decoding::PixelFormat> formats(images.size());
+  std::optional<int> bits;
+  for (const auto& of_camera : images) bits = std::max(bits, image_decoding::bits_in_use(of_camera));
   for (std::size_t i = 0; i < images.size(); ++i) {
-    formats[i].bits = image_decoding::bits_in_use(images[i]);
+    formats[i].bits = bits.value_or(formats[i].bits);
     if (!request.bayer.empty()) formats[i].bayer = request.bayer[request.bayer.size() == 1 ? 0 : i];
   }
   return formats;
@@ -116,12 +120,11 @@ Status group(const DatasetRequest& request, const std::vector<std::vector<image_
 
 // Warns if no camera has images for so long that the recording may be two, or its clock may have been set.
 void warn_of_jumps(const fs::path& path, Dataset& dataset) {
-  constexpr TimeNs kLong_ns = 60'000'000'000;
   constexpr TimeNs kIntervals = 20;
   std::vector<TimeNs> times;
   for (const FrameEntry& frame : dataset.frames) times.push_back(frame.time_ns);
   if (times.size() < 3) return;
-  const TimeNs least_ns = std::max(kLong_ns, kIntervals * image::median_interval(times));
+  const TimeNs least_ns = std::max(kLongPause, kIntervals * image::median_interval(times));
   std::size_t jumps = 0, first = 0;
   for (std::size_t k = 1; k < times.size(); ++k) {
     if (times[k] - times[k - 1] > least_ns && jumps++ == 0) first = k;

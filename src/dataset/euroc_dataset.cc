@@ -7,10 +7,12 @@
 
 #include "base/atomic_file.h"
 #include "base/number_text.h"
+#include "dataset/camera_folders.h"
 #include "dataset/image_names.h"
 #include "dataset/listed_images.h"
 #include "dataset/recording.h"
 #include "rig_formats/euroc_sensor.h"
+#include "rig_formats/rig_file.h"
 
 namespace bslam::dataset {
 namespace {
@@ -76,6 +78,27 @@ class EurocRecording : public Recording {
     if (images->empty()) return Error{file.string(), "", "no images", "one line timestamp,filename per image"};
     const fs::path folder = folders_[camera] / "data";
     return listed_images(*std::move(images), file, folder, image_files_of(folder), image_files::StampUnit::kOfFile);
+  }
+
+  // bslam simulate numbers the folders in the order of the rig, whose cameras may have other names.
+  std::vector<std::string> folder_names() const override {
+    std::vector<std::string> names;
+    for (const fs::path& folder : folders_) names.push_back(folder.filename().string());
+    std::error_code error;
+    const fs::path data = root_.parent_path();
+    if (!fs::exists(data / rig_formats::kComplete, error)) return names;
+    const auto rig = rig_formats::read_rig(data / "rig.yaml");
+    const std::vector<int> numbers = folder_numbers(names);
+    for (std::size_t c = 0; rig && c < numbers.size(); ++c) {
+      const auto number = static_cast<std::size_t>(numbers[c]);
+      if (number < rig->size()) names[c] = rig->camera(number).name;
+    }
+    return names;
+  }
+  std::vector<int> recorded_numbers() const override {
+    std::vector<std::string> names;
+    for (const fs::path& folder : folders_) names.push_back(folder.filename().string());
+    return folder_numbers(names);
   }
 
   std::optional<fs::path> ground_truth() const override {

@@ -161,6 +161,9 @@ class FolderRecording : public Recording {
     return names;
   }
   bool has_own_names() const override { return folders_.own_names; }
+  std::vector<int> recorded_numbers() const override {
+    return folders_.own_names ? std::vector<int>() : folder_numbers(folder_names());
+  }
 
  private:
   // Files that look like images, in all folders together.

@@ -45,6 +45,8 @@ Result<std::vector<TimeNs>> read_times(const fs::path& file) {
   return times;
 }
 
+std::string usual_name(std::size_t number) { return fmt::format("{:06}.png", number); }
+
 class KittiRecording : public Recording {
  public:
   KittiRecording(fs::path root, std::vector<int> cameras) : root_(std::move(root)), cameras_(std::move(cameras)) {}
@@ -74,16 +76,21 @@ class KittiRecording : public Recording {
     if (!times) return times.error();
     std::vector<image_files::ImageFile> images;
     for (std::size_t k = 0; k < times->size(); ++k) {
-      images.push_back(
-          {folder / fmt::format("{:06}.png", k), (*times)[k]});  // replaced below if the file has another name
+      images.push_back({folder / usual_name(k), (*times)[k]});  // replaced below if the file has another name
     }
     std::size_t without_time = 0;
+    std::vector<fs::path> again;  // with the number of another file
+    std::vector<bool> found(images.size(), false);
     for (image_files::NumberedImage& image : image_files::images_in(folder)) {
       const auto k = static_cast<std::size_t>(image.number);
-      if (k < images.size()) {
-        images[k].path = std::move(image.path);
-      } else {
+      if (k >= images.size()) {
         ++without_time;
+      } else if (found[k] && image.path != folder / usual_name(k)) {
+        again.push_back(std::move(image.path));
+      } else {
+        if (found[k]) again.push_back(images[k].path);
+        found[k] = true;
+        images[k].path = std::move(image.path);
       }
     }
     image_files::ImageList list =
@@ -92,10 +99,21 @@ class KittiRecording : public Recording {
       list.warnings.push_back(
           fmt::format("{}: {} images have no time in times.txt and are not used", folder.string(), without_time));
     }
+    if (!again.empty()) {
+      list.warnings.push_back(
+          fmt::format("{}: {} images have the number of another file and are not used, the first: {}", folder.string(),
+                      again.size(), std::ranges::min(again).filename().string()));
+    }
     return list;
   }
 
   bool has_times() const override { return true; }
+  std::vector<int> recorded_numbers() const override { return cameras_; }
+  std::vector<std::string> folder_names() const override {
+    std::vector<std::string> names;
+    for (const int camera : cameras_) names.push_back(rig_formats::kitti_image_folder(root_, camera).filename());
+    return names;
+  }
 
   std::optional<fs::path> ground_truth() const override {
     fs::path file = root_ / "poses.txt";

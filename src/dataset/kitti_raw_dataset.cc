@@ -68,6 +68,12 @@ class KittiRawRecording : public Recording {
 
   std::size_t camera_count() const override { return cameras_.size(); }
   bool has_times() const override { return true; }
+  std::vector<int> recorded_numbers() const override { return cameras_; }
+  std::vector<std::string> folder_names() const override {
+    std::vector<std::string> names;
+    for (const int camera : cameras_) names.push_back(folder_name(camera));
+    return names;
+  }
 
   Result<camera::RigCamera> calibration(std::size_t camera) const override {
     std::error_code error;
@@ -80,10 +86,12 @@ class KittiRawRecording : public Recording {
     }
     const auto rig = rig_formats::read_rig(file);
     if (!rig) return rig.error();
-    const auto number = static_cast<std::size_t>(cameras_[camera]);
-    if (number >= rig->size())
-      return Error{file.string(), "", fmt::format("{} cameras", rig->size()), fmt::format("camera {:02}", number)};
-    return camera::RigCamera{rig->camera(number), rig->body_from_cam(number)};
+    const std::string name = folder_name(cameras_[camera]);
+    for (std::size_t c = 0; c < rig->size(); ++c) {  // the file may lack cameras
+      if (rig->camera(c).name == name) return camera::RigCamera{rig->camera(c), rig->body_from_cam(c)};
+    }
+    return Error{file.string(), "", fmt::format("{} cameras", rig->size()),
+                 fmt::format("camera {:02}", cameras_[camera])};
   }
 
   Result<image_files::ImageList> images(std::size_t camera) const override {

@@ -44,9 +44,14 @@ class Recording {
   virtual bool has_own_names() const { return false; }
   // The same for the topics of a bag: the names of cameras in them ("/cam0/image_raw": cam0; empty if it is not the
   // only one with that name), and the topics themselves. None if it is no bag, or if their order was requested or
-  // recorded.
+  // recorded; if the rig was recorded, the names are those of its cameras.
   virtual std::vector<std::string> names_in_topics() const { return {}; }
   virtual std::vector<std::string> topics() const { return {}; }
+  // Returns the numbers of all cameras in the rig with which they were recorded, such as 0 and 2 of folders cam0 and
+  // cam2; empty if nothing says them, or the order of the cameras was requested.
+  virtual std::vector<int> recorded_numbers() const { return {}; }
+  // Returns true if the recording is several files that were requested in the order of the cameras.
+  virtual bool in_requested_order() const { return false; }
   // Messages for the user about damaged or missing parts found when the recording was opened.
   virtual std::vector<std::string> warnings() const { return {}; }
   // Describes the images of the cameras, and what else the recording contains. Warnings and what is missing are added

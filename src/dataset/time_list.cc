@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 #include <sstream>
 #include <system_error>
 #include <utility>
@@ -68,16 +69,26 @@ Result<std::vector<Line>> read_lines(const fs::path& file) {
 
 bool is_whole(const Line& line) { return line.time.find_first_of(".eE") == std::string::npos; }
 
-// Returns true if the times are impossible for a camera, so that they are in another unit.
+// Returns the error if the times are impossible for a camera, so that they are in another unit. A list may name the
+// images of several cameras, each in a folder of its own.
 Status check_interval(const TimeList& list, bool whole) {
-  if (list.times_ns.size() < 2) return {};
-  const TimeNs interval_ns = image::median_interval(list.times_ns);
-  if (interval_ns >= kShortestInterval && (whole || interval_ns <= kLongestInterval)) return {};
-  return Error{list.file.string(), "",
-               whole ? fmt::format("whole numbers {} apart", interval_ns)
-                     : fmt::format("times {:g} s apart", to_seconds(interval_ns)),
-               "seconds with a decimal point, or whole nanoseconds; --stamp-unit UNIT says what whole numbers are, and "
-               "--rate HZ uses the numbers in the names of the images instead"};
+  std::map<fs::path, std::vector<TimeNs>> cameras;
+  for (std::size_t k = 0; k < list.times_ns.size(); ++k) {
+    const fs::path folder = list.names.empty() ? fs::path() : fs::path(list.names[k]).parent_path();
+    cameras[folder].push_back(list.times_ns[k]);
+  }
+  for (const auto& [folder, times_ns] : cameras) {
+    if (times_ns.size() < 2) continue;
+    const TimeNs interval_ns = image::median_interval(times_ns);
+    if (interval_ns >= kShortestInterval && (whole || interval_ns <= kLongestInterval)) continue;
+    return Error{
+        list.file.string(), "",
+        whole ? fmt::format("whole numbers {} apart", interval_ns)
+              : fmt::format("times {:g} s apart", to_seconds(interval_ns)),
+        "seconds with a decimal point, or whole nanoseconds; --stamp-unit UNIT says what whole numbers are, and "
+        "--rate HZ uses the numbers in the names of the images instead"};
+  }
+  return {};
 }
 
 // Returns which of the files exist in the folder.

@@ -80,6 +80,7 @@ class VideoRecording : public Recording {
   std::size_t camera_count() const override { return store_->camera_count(); }
   bool calibrated() const override { return false; }
   bool has_times() const override { return true; }
+  bool in_requested_order() const override { return true; }
   std::vector<std::string> warnings() const override { return warnings_; }
 
   Result<camera::RigCamera> calibration(std::size_t camera) const override {

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "base/atomic_file.h"
+#include "base/exact_seconds.h"
 
 namespace bslam::evaluation {
 
@@ -243,12 +244,6 @@ Result<Trajectory> kitti_trajectory(const std::filesystem::path& file, const std
     trajectory.push_back({(*times)[i], *pose});
   }
   return trajectory;
-}
-
-// Seconds with nine decimals, exact.
-std::string exact_seconds(TimeNs time_ns) {
-  const TimeNs magnitude = std::abs(time_ns);
-  return fmt::format("{}{}.{:09}", time_ns < 0 ? "-" : "", magnitude / 1'000'000'000, magnitude % 1'000'000'000);
 }
 
 }  // namespace

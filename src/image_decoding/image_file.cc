@@ -21,12 +21,29 @@ namespace {
 
 constexpr std::size_t kMaxImageBytes = std::size_t{1} << 30;
 
-// Returns true if the bytes start as a JPEG and end with the end-of-image marker. Zeros after it, which some recorders
-// add, are allowed.
+// Returns true if the end-of-image marker follows the segments and the image data of a JPEG, from which it differs by
+// the lengths of the former and the zeros after each 0xff in the latter.
+bool reaches_its_end(std::string_view bytes) {
+  constexpr unsigned char kEnd = 0xd9, kFirstRestart = 0xd0, kFill = 0xff;
+  const auto byte = [&](std::size_t at) { return static_cast<unsigned char>(bytes[at]); };
+  std::size_t at = 2;  // after the marker of the start
+  while ((at = bytes.find('\xff', at)) != std::string_view::npos && at + 1 < bytes.size()) {
+    const unsigned char marker = byte(at + 1);
+    if (marker == kEnd) return true;
+    at += marker == kFill ? 1 : 2;
+    const bool in_data = marker <= 1 || marker == kFill || (marker >= kFirstRestart && marker < kEnd);
+    if (in_data || at + 2 > bytes.size()) continue;
+    at += std::size_t{byte(at)} << 8 | byte(at + 1);
+  }
+  return false;
+}
+
+// Returns true if the bytes start as a JPEG and contain all of it. Cameras and recorders may add others, such as zeros,
+// the rest of a buffer, or a video.
 bool is_whole_jpeg(std::string_view bytes) {
   if (!bytes.starts_with("\xff\xd8\xff")) return false;
   const std::size_t last = bytes.find_last_not_of('\0');
-  return last != std::string_view::npos && bytes.substr(0, last + 1).ends_with("\xff\xd9");
+  return bytes.substr(0, last + 1).ends_with("\xff\xd9") || reaches_its_end(bytes);
 }
 
 // Returns the upper eight of `bits` bits; larger values are white.
@@ -157,7 +174,7 @@ std::optional<image::Image> decode_stored(const image_files::StoredImage& stored
   return without_colour_filter(*std::move(image), filter);
 }
 
-int bits_in_use(std::span<const image_files::ImageFile> images) {
+std::optional<int> bits_in_use(std::span<const image_files::ImageFile> images) {
   constexpr std::size_t kSamples = 12;
   const std::size_t count = std::min(kSamples, images.size());
   double largest = 0;
@@ -165,23 +182,24 @@ int bits_in_use(std::span<const image_files::ImageFile> images) {
     const auto stored = read_stored(images[k * images.size() / count]);
     if (!stored) continue;
     if (stored->layout != image_files::PixelLayout::kFile) {
-      if (stored->bytes_per_value != 2) return 16;
+      if (stored->bytes_per_value != 2) return std::nullopt;
       largest = std::max(largest, static_cast<double>(largest_value(*stored)));
       continue;
     }
     const std::string_view bytes = stored->bytes;
     const std::string_view file = bytes.substr(std::min(stored->begin, bytes.size()), stored->size);
     const bool png = image_files::is_complete_png(file);
-    if (is_whole_jpeg(file) || is_whole_webp(file) || (png && !is_16_bit_png(file))) return 16;
+    if (is_whole_jpeg(file) || is_whole_webp(file) || (png && !is_16_bit_png(file))) return std::nullopt;
     if (!png && !is_plain_file(file)) continue;
     const cv::Mat decoded = decode_to_grey(file);
-    if (!decoded.empty() && decoded.depth() == CV_8U) return 16;
+    if (!decoded.empty() && decoded.depth() == CV_8U) return std::nullopt;
     double value = 0;
     if (!decoded.empty()) cv::minMaxLoc(decoded, nullptr, &value);
     largest = std::max(largest, value);
   }
+  if (largest <= 0) return std::nullopt;
   for (const int bits : {8, 10, 12, 14}) {
-    if (largest > 0 && largest < static_cast<double>(1 << bits)) return bits;
+    if (largest < static_cast<double>(1 << bits)) return bits;
   }
   return 16;
 }

@@ -33,9 +33,9 @@ Result<image::Image> read_image(const image_files::ImageFile& image, const Pixel
 std::optional<image::Image> decode_stored(const image_files::StoredImage& image, const PixelFormat& format = {});
 
 // Returns the number of bits in use in the 16-bit images of a camera: the smallest of 8, 10, 12, 14 and 16 that holds
-// all values of a few readable images spread over the list. Returns 16 if one of them has 8 bits, since such a camera
-// has no common number of bits.
-int bits_in_use(std::span<const image_files::ImageFile> images);
+// all values of a few readable images spread over the list. Returns nullopt if one of them has 8 bits, since such a
+// camera has no common number of bits, and if all that can be read are black.
+std::optional<int> bits_in_use(std::span<const image_files::ImageFile> images);
 
 // Reads a mask, which is 0 where the file has the value 0 or the colour black, whatever its number of bits.
 // FILE.mcap/NAME is an attachment of an MCAP file. Errors as read_image; no such attachment.

@@ -8,6 +8,7 @@
 #include <system_error>
 
 #include "base/atomic_file.h"
+#include "base/exact_seconds.h"
 #include "base/lower_case.h"
 #include "base/number_text.h"
 
@@ -51,7 +52,7 @@ std::string steps_back_text(const std::vector<ImageFile>& images, StampUnit unit
   }
   if (steps == 0) return {};
   const auto stamp = [unit](TimeNs time_ns) {
-    return unit == StampUnit::kSeconds ? fmt::format("{:.9f} s", to_seconds(time_ns)) : std::to_string(time_ns);
+    return unit == StampUnit::kSeconds ? exact_seconds(time_ns) + " s" : std::to_string(time_ns);
   };
   return fmt::format("time stamps step back {} time{}, first from {} to {}; images have been sorted", steps,
                      steps == 1 ? "" : "s", stamp(images[first - 1].time_ns), stamp(images[first].time_ns));

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/exact_seconds.h"
 #include "base/median.h"
 #include "dataset/recording_description.h"
 #include "dataset/time_stamps.h"
@@ -112,8 +113,8 @@ std::string used_text(const RecordingDescription& recording) {
 
 std::string as_text(const std::string& path, const RecordingDescription& recording) {
   const Span span = span_of(recording);
-  std::string text = fmt::format("{}: {}, {:.3f} s from {:.9f} s\n", path, recording.format,
-                                 to_seconds(span.last_ns - span.first_ns), to_seconds(span.first_ns)) +
+  std::string text = fmt::format("{}: {}, {:.3f} s from {} s\n", path, recording.format,
+                                 to_seconds(span.last_ns - span.first_ns), exact_seconds(span.first_ns)) +
                      table(recording, span);
   for (const StreamDescription& s : recording.streams) {
     if (!s.unused.empty()) text += fmt::format("not used: {}: {}\n", s.name, s.unused);

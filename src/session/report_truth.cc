@@ -29,6 +29,17 @@ std::optional<geometry::SE3> camera_in_truth_frame(const dataset::Dataset& datas
   return dataset.whole_rig->rig_from_cam(used);
 }
 
+// Returns what to know about the comparison, or null. Poses of the body are compared with those of camera 0 as if they
+// were the same if the calibration has no body; in KITTI, the body is that of the calibration.
+ordered_json note_of_body(const dataset::Dataset& dataset) {
+  const bool of_body =
+      dataset.ground_truth->filename() != "groundtruth_cam0.tum" && dataset.format != dataset::DatasetFormat::kKitti;
+  const camera::Rig& whole = dataset.whole_rig ? *dataset.whole_rig : dataset.rig;
+  if (!of_body || !whole.body_from_cam(0).matrix().isIdentity(0)) return nullptr;
+  return "The calibration gives camera 0 no pose on the body other than the identity: the body, whose poses are the "
+         "ground truth, is taken to be camera 0.";
+}
+
 // The true poses of camera 0 from the first frame to the last one that was processed, with a margin of `tolerance_ns`.
 Trajectory truth_of_camera(const Trajectory& truth, const dataset::Dataset& dataset, std::optional<TimeNs> last_ns,
                            const geometry::SE3& T_truth_cam0, TimeNs tolerance_ns) {
@@ -75,6 +86,7 @@ ordered_json report_truth(const dataset::Dataset& dataset, const Trajectory& pat
     error.push_back(static_cast<float>(found->errors[i].position_m));
   }
   return {{"file", dataset.ground_truth->filename().string()},
+          {"note", note_of_body(dataset)},
           {"scale_aligned", !metric},
           {"ate_m", statistics_json(found->ate)},
           {"rpe_delta_s", found->rpe.delta_s},

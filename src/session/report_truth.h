@@ -13,8 +13,8 @@ namespace bslam::session {
 // Errors over time of the path of camera 0, after alignment as by `bslam eval`, and its true path in the world of the
 // estimate. The ground truth, which is that of the body, is moved to camera 0 with the calibration: the converse would
 // add metres to a path of unknown scale. `metric`: the scale of the map is known, so that it is not aligned. Returns
-// null without ground truth, and {"error": TEXT} if it cannot be used. `last_ns`: the time of the last frame that was
-// processed, if the run was interrupted before the end of the data set.
+// null without ground truth, and {"error": TEXT} if it cannot be used. "note" says that the calibration has no body.
+// `last_ns`: the time of the last frame that was processed, if the run was interrupted before the end of the data set.
 nlohmann::ordered_json report_truth(const dataset::Dataset& dataset, const evaluation::Trajectory& path, bool metric,
                                     std::optional<TimeNs> last_ns = {});
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dataset/long_pause.h"
+
 namespace bslam::session {
 
 void RunControl::pause() {
@@ -42,13 +44,16 @@ RunControl::State RunControl::state() const {
 }
 
 std::optional<RunControl::Clock::time_point> RunControl::due(TimeNs time_ns) const {
+  constexpr double kMost_ns = 1e18;  // further than any wait; sums with it fit
   if (speed_ == 0 || !anchor_) return std::nullopt;
-  const double after_ns = static_cast<double>(time_ns - anchor_->time_ns) / speed_;
-  return anchor_->due + std::chrono::nanoseconds(std::llround(after_ns));
+  const double after_ns = (static_cast<double>(time_ns) - static_cast<double>(anchor_->time_ns)) / speed_;
+  return anchor_->due + std::chrono::nanoseconds(std::llround(std::clamp(after_ns, -kMost_ns, kMost_ns)));
 }
 
 bool RunControl::wait_for(TimeNs time_ns, const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
+  if (last_ns_ && (time_ns < *last_ns_ || time_ns - *last_ns_ > dataset::kLongPause)) anchor_.reset();
+  last_ns_ = time_ns;
   for (;;) {
     if (paused_) {
       if (!changed_.wait(lock, stop, [this] { return !paused_ || steps_ > 0; })) return false;

@@ -34,7 +34,8 @@ class RunControl {
   State state() const;
 
   // Waits until the next frame, which was captured at `time_ns`, is to be fed, and returns true; or until a stop is
-  // requested, and returns false. Frames are due relative to the first one, or to the last one before the pace changed.
+  // requested, and returns false. Frames are due relative to the first one, or to the last one before the pace changed,
+  // or to the first one after a pause or a jump of the clock (dataset::kLongPause), which is not waited for.
   bool wait_for(TimeNs time_ns, const std::stop_token& stop);
 
   // How late a frame captured at `time_ns` is, in seconds of the recorded pace; 0 if it is not late, while paused, and
@@ -55,7 +56,8 @@ class RunControl {
   bool paused_ = false;
   int steps_ = 0;  // frames that may pass while paused
   double speed_;
-  std::optional<Anchor> anchor_;  // nullopt: the next frame is due at once, and becomes the anchor
+  std::optional<TimeNs> last_ns_;  // time of the last frame
+  std::optional<Anchor> anchor_;   // nullopt: the next frame is due at once, and becomes the anchor
 };
 
 }  // namespace bslam::session

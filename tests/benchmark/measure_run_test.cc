@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "benchmark/benchmark_report.h"
 #include "evaluation/association.h"
 #include "evaluation/trajectory_file.h"
 #include "geometry/so3.h"
@@ -88,6 +89,25 @@ TEST_F(MeasureRun, CameraTruthIsComparedDirectlyAndOnlyByProtocolT) {
   ASSERT_TRUE(m.ok());
   EXPECT_FALSE(m->ate_p_m);
   EXPECT_LT(m->ate_t_m.value_or(1.0), 1e-6);
+}
+
+TEST_F(MeasureRun, ACalibrationWithoutABodyIsRemarked) {
+  std::string summary = support::read_text(folder_.path() / "summary.json");
+  summary.replace(summary.find("[{}, {}]"), 8, "[{}]");
+  support::write_text(folder_.path() / "summary.json", summary);
+  const auto remark = [&](const Sequence& sequence, const geometry::SE3& pose) {
+    return benchmark_report({{sequence, {measure_run(folder_.path(), sequence, pose).value()}}}, {})
+        .tables[0]
+        .rows[0]
+        .back();
+  };
+  EXPECT_EQ(
+      remark(with_body_truth(), {}),
+      "the calibration gives camera 0 no pose on the body other than the identity: the body is taken to be camera 0");
+  EXPECT_EQ(remark(with_body_truth(), body_from_camera_), "");
+  Sequence of_camera = with_body_truth();
+  of_camera.released = Truth{folder_.path() / "trajectory.tum", TruthFrame::kCamera0};
+  EXPECT_EQ(remark(of_camera, {}), "");
 }
 
 TEST_F(MeasureRun, AnUnreadableTruthIsReportedBesideTheCoverage) {

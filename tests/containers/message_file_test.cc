@@ -223,6 +223,31 @@ TEST(MessageFile, AbsurdSizesAreNotBelieved) {
   for (const MessageRef& message : (*file)->messages()) EXPECT_TRUE((*file)->read(message, kWholeMessage));
 }
 
+// A length up to the end of a large file, as one wrong byte makes it.
+TEST(MessageFile, AMessageOfAbsurdLengthIsDamagedAndReservesNoMemory) {
+  const support::TemporaryFolder folder;
+  const fs::path path = folder.path() / "a.mcap";
+  const auto messages = test_messages(Wire::kCdr);
+  std::string bytes = support::mcap_bytes(messages, Wire::kCdr, {"", 0, false});
+  const std::size_t data = bytes.find(messages.back().bytes);
+  ASSERT_NE(data, std::string::npos);
+  constexpr std::size_t kMessageHead = 22, kLength = 8;
+  const std::size_t length = data - kMessageHead - kLength;
+  ASSERT_EQ(bytes[length - 1], 5);  // a message
+  bytes.resize(data + messages.back().bytes.size());
+  bytes[length + 3] = '\x60';  // 1.5 GiB
+  support::write_text(path, bytes);
+  fs::resize_file(path, std::uintmax_t{1} << 31);
+  const auto file = open_message_file(path);
+  ASSERT_TRUE(file) << file.error().message();
+  ASSERT_EQ((*file)->messages().size(), 2u * kImages);
+  EXPECT_TRUE((*file)->read((*file)->messages().back(), 80));
+  const auto whole = (*file)->read((*file)->messages().back(), kWholeMessage);
+  ASSERT_FALSE(whole);
+  EXPECT_EQ(whole.error().found, "a message that is damaged or cut off");
+  EXPECT_TRUE((*file)->read((*file)->messages().front(), kWholeMessage));
+}
+
 TEST(MessageFile, ASqliteMessageCannotBeLargerThanItsFile) {
   const support::TemporaryFolder folder;
   const fs::path bag = folder.path() / "a.db3";

@@ -69,6 +69,19 @@ TEST_F(SmallKitti, WarnsOfImagesWithoutATime) {
   EXPECT_NE(dataset->warnings[0].find("1 images have no time in times.txt and are not used"), std::string::npos);
 }
 
+TEST_F(SmallKitti, OfTwoFilesWithOneNumberTheOneWithTheUsualNameIsUsed) {
+  for (const char* name : {"1.png", "000001.jpg", "00000001.png"})
+    support::write_image(data() / "image_0" / name, 9, 9);
+  fs::rename(image(2, 0), data() / "image_0" / "2.png");
+  const auto dataset = open();
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  EXPECT_EQ(dataset->frames[1].images[0]->path, image(1, 0));
+  EXPECT_EQ(dataset->frames[2].images[0]->path, data() / "image_0" / "2.png");
+  EXPECT_EQ(dataset->warnings, std::vector{(data() / "image_0").string() +
+                                           ": 3 images have the number of another file and are not used, the first: "
+                                           "00000001.png"});
+}
+
 TEST_F(SmallKitti, RejectsTimesThatAreNoSeconds) {
   std::string times;
   for (int k = 0; k < 10; ++k) times += std::to_string(100'000'000 * k) + "\n";
@@ -123,18 +136,17 @@ TEST(FolderDataset, ACameraWithItsListBesideItsImagesIsNotEurocs) {
   EXPECT_EQ(dataset->frames.size(), static_cast<std::size_t>(support::kSmallFrames));
 }
 
-// KITTI raw data: the calibration of the day is beside the folders of its drives.
-TEST(KittiRaw, DatesAndTheCalibrationOfTheDayAreRead) {
-  const support::TemporaryFolder day;
-  const fs::path data = day.path() / "drive_0001_sync";
+// Writes the images of cameras of KITTI raw data, and the calibration of the day beside the folders of its drives.
+// Camera N is N half metres to the right of camera 0.
+void write_kitti_raw(const fs::path& day, const std::vector<int>& cameras) {
   std::string calibration = "calib_time: 09-Jan-2012 13:57:47\n";
-  for (int c = 0; c < 2; ++c) {
-    const std::string number = "_0" + std::to_string(c), shift = c == 0 ? "0" : "-25";
+  for (const int c : cameras) {
+    const std::string number = "_0" + std::to_string(c), shift = std::to_string(-25 * c);
     calibration += "S" + number + ": 60 20\nK" + number + ": 50 0 30 0 50 10 0 0 1\nD" + number + ": 0 0 0 0 0\nR" +
-                   number + ": 1 0 0 0 1 0 0 0 1\nT" + number + ": " + (c == 0 ? "0" : "-0.5") + " 0 0\nS_rect" +
+                   number + ": 1 0 0 0 1 0 0 0 1\nT" + number + ": " + std::to_string(-0.5 * c) + " 0 0\nS_rect" +
                    number + ": 60 20\nR_rect" + number + ": 1 0 0 0 1 0 0 0 1\nP_rect" + number + ": 50 0 30 " + shift +
                    " 0 50 10 0 0 0 1 0\n";
-    const fs::path folder = data / ("image" + number);
+    const fs::path folder = day / "drive_0001_sync" / ("image" + number);
     std::string dates;
     for (int k = 0; k < 5; ++k) {
       dates += "2011-09-26 13:02:25." + std::to_string(100000445 + 100000000 * k) + "\n";
@@ -142,7 +154,23 @@ TEST(KittiRaw, DatesAndTheCalibrationOfTheDayAreRead) {
     }
     support::write_text(folder / "timestamps.txt", dates);
   }
-  support::write_text(day.path() / "calib_cam_to_cam.txt", calibration);
+  support::write_text(day / "calib_cam_to_cam.txt", calibration);
+}
+
+TEST(KittiRaw, CamerasHaveTheCalibrationOfTheirNumber) {
+  const support::TemporaryFolder day;
+  write_kitti_raw(day.path(), {0, 2, 3});
+  const auto dataset = open_dataset({.path = day.path() / "drive_0001_sync"});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  ASSERT_EQ(dataset->rig.size(), 3u);
+  EXPECT_NEAR(dataset->rig.rig_from_cam(1).translation().x(), 1.0, 1e-9);
+  EXPECT_NEAR(dataset->rig.rig_from_cam(2).translation().x(), 1.5, 1e-9);
+}
+
+TEST(KittiRaw, DatesAndTheCalibrationOfTheDayAreRead) {
+  const support::TemporaryFolder day;
+  const fs::path data = day.path() / "drive_0001_sync";
+  write_kitti_raw(day.path(), {0, 1});
   const DatasetRequest request{.path = data};
   const auto dataset = open_dataset(request);
   ASSERT_TRUE(dataset) << dataset.error().message();

@@ -465,7 +465,7 @@ TEST_F(SmallEuroc, IsNotOnlyUncalibratedIfItsListsCannotBeRead) {
   ASSERT_TRUE(described);
   EXPECT_FALSE(described->only_uncalibrated);
   ASSERT_EQ(described->streams.size(), 2u);
-  EXPECT_EQ(described->streams[1].name, "camera 1");
+  EXPECT_EQ(described->streams[1].name, "cam1");
   EXPECT_NE(described->streams[1].unused.find("found soon"), std::string::npos) << described->streams[1].unused;
 }
 

@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
 
 #include "dataset/dataset.h"
 #include "dataset/frame_reader.h"
@@ -314,6 +316,19 @@ TEST_F(ImageFolders, ListsMayHavePathsAndNameImagesThatAreNotThere) {
   EXPECT_TRUE(has_text(dataset->warnings, "front/000002.png"));
 }
 
+TEST_F(ImageFolders, OneListMayNameTheImagesOfAllCamerasInOrderOfTime) {
+  for (const char* name : {"front", "rear"}) add(name, numbered);
+  std::string times;
+  for (int k = 0; k < kImages; ++k) {
+    for (const char* name : {"front/", "rear/"}) times += "100." + std::to_string(k) + " " + name + numbered(k) + "\n";
+  }
+  support::write_text(data() / "times.txt", times);
+  const auto dataset = open({"front", "rear"});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  ASSERT_EQ(dataset->frames.size(), static_cast<std::size_t>(kImages));
+  EXPECT_EQ(dataset->frames[3].images[1]->time_ns, 100'300'000'000);
+}
+
 TEST_F(ImageFolders, OneListMayNameImagesThatAreOneFolderDeeper) {
   add("front/data", numbered);
   add("back/data", numbered);
@@ -408,6 +423,20 @@ TEST_F(ImageFolders, SecondsAreNoNumbersOfImages) {
   const auto in_seconds = open({"a"}, {}, {.unit_ns = TimeNs{1'000'000'000}});
   ASSERT_TRUE(in_seconds) << in_seconds.error().message();
   EXPECT_FALSE(has_text(in_seconds->warnings, "numbers of images"));
+}
+
+// A camera that sees only shadow is as dark as the others see it.
+TEST_F(ImageFolders, AllCamerasOfSixteenBitsHaveTheSameBitsInUse) {
+  for (const auto& [name, largest] : {std::pair("bright", 4000), std::pair("dark", 200), std::pair("covered", 0)}) {
+    add_stamped(name);
+    for (const auto& entry : fs::directory_iterator(data() / name))
+      ASSERT_TRUE(cv::imwrite(entry.path().string(), cv::Mat(20, 60, CV_16UC1, cv::Scalar(largest))));
+  }
+  add_stamped("eight");
+  const auto dataset = open({"bright", "dark", "covered", "eight"});
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  ASSERT_EQ(dataset->pixel_formats.size(), 4u);
+  for (const image_decoding::PixelFormat& format : dataset->pixel_formats) EXPECT_EQ(format.bits, 12);
 }
 
 TEST_F(ImageFolders, RecordingsInOtherFoldersAreNamed) {

@@ -94,6 +94,43 @@ TEST_F(LiveRecordingTest, HasAnOrderOfItsTopicsForOtherRigs) {
   EXPECT_EQ(data->sources, std::vector{kTopics[0]});
 }
 
+// A rig file that has more cameras than were recorded: that of the run, of which it used a part.
+TEST_F(LiveRecordingTest, HasTheNumbersOfItsCamerasInOtherRigs) {
+  write(rig_formats::rig_to_yaml(rig_), {0, 2});
+  const auto file = folder_.path() / "three.yaml";
+  std::vector<camera::RigCamera> cameras;
+  for (const char* name : {"a", "b", "c"}) {
+    cameras.push_back({rig_.camera(std::size_t{0}), rig_.body_from_cam(0)});
+    cameras.back().camera.name = name;
+  }
+  support::write_text(file, rig_formats::rig_to_yaml(camera::Rig(cameras)));
+  const auto data = open_dataset({.path = path(), .rig_file = file, .cameras = {2, 0}});
+  ASSERT_TRUE(data.ok()) << data.error().message();
+  EXPECT_EQ(data->sources, (std::vector{kTopics[1], kTopics[0]}));
+  EXPECT_EQ(data->rig.camera(std::size_t{0}).name, "c");
+  const std::string refused = path().string() + ": found images of a, c, expected images of camera 1 (b) as well, " +
+                              "since " + file.string() +
+                              " has 3 cameras; --cameras 0,2 selects those that it has, and --topics names the "
+                              "topics of all cameras in their order";
+  for (const std::vector<int>& selected : {std::vector<int>(), {0, 1}, {1}}) {
+    const auto part = open_dataset({.path = path(), .rig_file = file, .cameras = selected});
+    ASSERT_FALSE(part.ok());
+    EXPECT_EQ(part.error().message(), refused);
+  }
+  cameras.pop_back();  // a rig of the recorded cameras
+  support::write_text(file, rig_formats::rig_to_yaml(camera::Rig(cameras)));
+  EXPECT_EQ(open_dataset({.path = path(), .rig_file = file})->sources, kTopics);
+}
+
+TEST_F(LiveRecordingTest, HasTheNamesOfItsCameras) {
+  write(rig_formats::rig_to_yaml(rig_), {0, 2});
+  const auto file = folder_.path() / "swapped.yaml";
+  support::write_text(file, rig_formats::rig_to_yaml(rig_.subset(std::vector{1, 0})));
+  const auto data = open_dataset({.path = path(), .rig_file = file});
+  ASSERT_TRUE(data.ok()) << data.error().message();
+  EXPECT_EQ(data->sources, (std::vector{kTopics[1], kTopics[0]}));
+}
+
 // As recordings of earlier versions have it.
 TEST_F(LiveRecordingTest, NamesAMaskThatItsRigHasAndNoFile) {
   camera::Camera masked = rig_.camera(std::size_t{0});

@@ -100,8 +100,11 @@ TEST(ImageFile, FindsTheBitsInUseOverAllImages) {
   EXPECT_EQ(bits_in_use(files), 16);
   files.clear();
   write(200, CV_8UC1);
-  EXPECT_EQ(bits_in_use(files), 16);
-  EXPECT_EQ(bits_in_use({}), 16);
+  EXPECT_EQ(bits_in_use(files), std::nullopt);
+  EXPECT_EQ(bits_in_use({}), std::nullopt);
+  files.clear();
+  write(0, CV_16UC1);  // says nothing
+  EXPECT_EQ(bits_in_use(files), std::nullopt);
 }
 
 TEST(ImageFile, ConvertsColoursOfSixteenBitsToGrey) {
@@ -204,6 +207,27 @@ TEST(ImageFile, AcceptsAJpegWithBytesBeforeItsEndMarker) {
   const auto image = decode_grey(bytes);
   ASSERT_TRUE(intact && image);
   EXPECT_EQ(image->row(239)[319], intact->row(239)[319]);
+}
+
+// Phones and action cameras add previews, depth and videos, and drivers the rest of their buffers.
+TEST(ImageFile, AcceptsAJpegWithBytesAfterItsEndMarker) {
+  const cv::Mat original = picture_of(320, 240, CV_8UC3);
+  const std::string preview = encoded(picture_of(32, 24), ".jpg");
+  for (const std::vector<int>& parameters :
+       {std::vector<int>(), {cv::IMWRITE_JPEG_PROGRESSIVE, 1}, {cv::IMWRITE_JPEG_RST_INTERVAL, 2}}) {
+    std::string bytes = encoded(original, ".jpg", parameters);
+    // A segment whose content looks like the end, as that with a preview.
+    bytes.insert(2, std::string("\xff\xe1") + '\0' + '\x06' + "\xff\xd9\xff\xd9");
+    const auto intact = decode_grey(bytes);
+    ASSERT_TRUE(intact);
+    for (const std::string& added : {std::string("some text"), std::string(5000, '\xff'), preview, preview + "text"}) {
+      const auto image = decode_grey(bytes + added);
+      ASSERT_TRUE(image) << added.size();
+      EXPECT_EQ(image->row(239)[319], intact->row(239)[319]);
+    }
+    for (std::size_t size = 0; size < bytes.size(); size += size + 200 < bytes.size() ? 97 : 1)
+      EXPECT_FALSE(decode_grey(bytes.substr(0, size) + "text")) << size;
+  }
 }
 
 TEST(ImageFile, RejectsOtherData) {

@@ -18,6 +18,9 @@ TEST(TimeOrder, StepsBackAreCountedAndTheFirstIsNamed) {
   EXPECT_EQ(list.images[1].time_ns, 120);
   EXPECT_EQ(sorted({1'500'000'000, 1'250'000'000}, StampUnit::kSeconds).warnings[0],
             "cam0: time stamps step back 1 time, first from 1.500000000 s to 1.250000000 s; images have been sorted");
+  EXPECT_EQ(sorted({1'000'000'000'000'000'119, 1'000'000'000'000'000'003}, StampUnit::kSeconds).warnings[0],
+            "cam0: time stamps step back 1 time, first from 1000000000.000000119 s to 1000000000.000000003 s; images "
+            "have been sorted");
   EXPECT_TRUE(sorted({1, 2, 3}).warnings.empty());
 }
 

@@ -133,6 +133,20 @@ TEST(ReportTruth, IsMovedFromTheBodyToCamera0) {
   EXPECT_NEAR(double(scaled["scale"]), 10.0, 1e-6);
 }
 
+TEST(ReportTruth, SaysThatACalibrationHasNoBody) {
+  const support::TemporaryFolder folder;
+  Path path;
+  support::write_text(folder.path() / "truth.tum", evaluation::tum_text(path.poses, ""));
+  path.dataset.ground_truth = folder.path() / "truth.tum";
+  EXPECT_TRUE(report_truth(path.dataset, path.poses, true)["note"].is_null());
+  path.dataset.rig = camera::Rig({{path.dataset.rig.camera(0u), SE3()}});
+  const auto note = report_truth(path.dataset, path.poses, true)["note"];
+  ASSERT_TRUE(note.is_string());
+  EXPECT_NE(std::string(note).find("is taken to be camera 0"), std::string::npos);
+  path.dataset.format = dataset::DatasetFormat::kKitti;  // whose poses are those of image_0
+  EXPECT_TRUE(report_truth(path.dataset, path.poses, true)["note"].is_null());
+}
+
 TEST(ReportTruth, CountsWhileTheRecordingWasProcessed) {
   const support::TemporaryFolder folder;
   Path path;

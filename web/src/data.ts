@@ -79,6 +79,7 @@ export interface Residuals {
 
 export interface Truth {
   error?: string;  // why the ground truth could not be used; nothing else is present then
+  note: string | null;  // what to know about the comparison
   file: string; scale_aligned: boolean;
   ate_m: { rmse: number | null; median: number | null; max: number | null; count: number };
   rpe_delta_s: number;

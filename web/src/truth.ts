@@ -28,6 +28,7 @@ export function truthSection(run: Run, parent: HTMLElement): Drawing {
     parent.append(h('p', {}, `The ground truth of the data set could not be used: ${truth.error}`));
     return { update: () => {}, remove: () => {} };
   }
+  if (truth.note) parent.append(h('p', {}, truth.note));
   const figures = h('div', {}, figuresOf(run));
   parent.append(figures);
   const chart = addChart(parent, run, chartOptions(run));
