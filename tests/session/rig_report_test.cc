@@ -219,6 +219,15 @@ TEST_F(RigReport, ACameraThatBecomesLateIsFound) {
   ASSERT_TRUE(found);
   EXPECT_EQ(found->part, "last half");
   EXPECT_TRUE(found->early);
+
+  // Some images have wrong time stamps.
+  constexpr TimeNs kWrong = 60'000'000;
+  late.front().images[1].time_ns += kWrong;
+  const auto despite = calibration::find_late_camera(data->rig, late, masks);
+  ASSERT_TRUE(despite);
+  EXPECT_TRUE(despite->early);
+  for (std::size_t k = 0; k < late.size(); k += 3) late[k].images[1].time_ns += kWrong;
+  EXPECT_FALSE(calibration::find_late_camera(data->rig, late, masks));
 }
 
 }  // namespace
