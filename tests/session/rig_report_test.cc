@@ -192,6 +192,18 @@ TEST_F(RigReport, TestsTheExtrinsicsAgainstImages) {
   EXPECT_EQ(mirrored[0].mirrored->camera, 1u);
   EXPECT_NE(calibration::describe_evidence(mirrored).find("warning: the images of camera 1 are mirrored"),
             std::string::npos);
+
+  // A mask belongs to the images as they are. One half of them is black, and the other half is masked.
+  std::vector<image::Image> masks(2);
+  const int width = rig.camera(1u).width, height = rig.camera(1u).height;
+  masks[1] = image::Image(width, height);
+  for (int y = 0; y < height; ++y) {
+    std::fill_n(masks[1].row(y), width / 2, std::uint8_t{255});
+    std::fill_n(masks[1].row(y) + width / 2, width - width / 2, std::uint8_t{0});
+    for (image::ImageBundle& frame : frames) std::fill_n(frame.images[1].image.row(y), width / 2, std::uint8_t{0});
+  }
+  EXPECT_TRUE(calibration::check_conventions(rig, frames, std::vector<image::Image>(2))[0].mirrored);
+  EXPECT_FALSE(calibration::check_conventions(rig, frames, masks)[0].mirrored);
 }
 
 // A camera loses a frame in the middle of a recording, and its further images are renumbered.
