@@ -16,7 +16,9 @@ namespace {
 
 using geometry::SE3;
 
-constexpr double kTolerancePx = 2.0;  // tolerance for the errors of calibration and feature localisation together
+// Tolerance for the errors of calibration and feature localisation together, the larger of the two: the angles by which
+// calibrations are wrong do not depend on the resolution.
+constexpr double kTolerancePx = 2.0, kTolerance = 0.0025;  // rad
 constexpr int kMinAgreeing = 25;
 constexpr double kMinRatio = 0.4;     // minimum fraction of consistent matches; random matches reach a few per cent
 constexpr double kClearly = 1.3;      // factor between numbers of consistent matches that counts as a clear difference
@@ -69,7 +71,7 @@ Hypothesis hypothesis_of(Convention convention, const camera::Rig& rig, std::siz
 
 // Radians.
 double tolerance_of(const camera::Camera& first, const camera::Camera& second) {
-  return kTolerancePx * std::max(first.radians_per_pixel(), second.radians_per_pixel());
+  return std::max(kTolerance, kTolerancePx * std::max(first.radians_per_pixel(), second.radians_per_pixel()));
 }
 
 // The pairs in images that are flipped as in the hypothesis.
@@ -198,19 +200,25 @@ PairEvidence judge_pair(const camera::Rig& rig, std::size_t i, std::size_t j, st
 
 namespace {
 
-// The keypoints of a camera in mirrored images.
-std::vector<View> mirrored_views(const camera::Rig& rig, std::size_t camera,
-                                 std::span<const image::ImageBundle> frames) {
+image::Image mirrored(const image::ImageView& image) {
+  image::Image out = image::copy_of(image);
+  for (int y = 0; y < out.height(); ++y) std::reverse(out.row(y), out.row(y) + out.width());
+  return out;
+}
+
+// The keypoints of a camera in mirrored images. The mask, drawn for the images as they are, is mirrored as well.
+std::vector<View> mirrored_views(const camera::Rig& rig, std::size_t camera, std::span<const image::ImageBundle> frames,
+                                 const image::Image& mask) {
   feature::Extractor extractor({});
   image::Pyramid pyramid;
+  const image::Image mirrored_mask = mirrored(mask.view());
   std::vector<View> out(frames.size());
   for (std::size_t k = 0; k < frames.size(); ++k) {
     const image::CameraImage& image = frames[k].images[camera];
     if (image.state != image::ImageState::kPresent) continue;
-    image::Image reversed = image::copy_of(image.view());
-    for (int y = 0; y < reversed.height(); ++y) std::reverse(reversed.row(y), reversed.row(y) + reversed.width());
     out[k].time_ns = image.time_ns;
-    extractor.extract(reversed.view(), {}, rig.camera(camera), pyramid, out[k].keypoints);
+    extractor.extract(mirrored(image.view()).view(), mirrored_mask.view(), rig.camera(camera), pyramid,
+                      out[k].keypoints);
   }
   return out;
 }
@@ -230,10 +238,11 @@ PairEvidence judge_views(const camera::Rig& rig, std::size_t i, std::size_t j, c
 // Finds which of the two cameras has mirrored images. Scenes may be symmetric, so that the geometry must agree as well.
 std::optional<MirroredCamera> find_mirrored(const camera::Rig& rig, const PairEvidence& pair,
                                             std::span<const image::ImageBundle> frames,
+                                            std::span<const image::Image> masks,
                                             const std::vector<std::vector<View>>& views) {
   constexpr int kMinMatches = 100, kTimes = 3;
   for (const std::size_t c : {pair.second, pair.first}) {
-    const std::vector<View> reversed = mirrored_views(rig, c, frames);
+    const std::vector<View> reversed = mirrored_views(rig, c, frames, masks[c]);
     const PairEvidence again = judge_views(rig, pair.first, pair.second, c == pair.first ? reversed : views[pair.first],
                                            c == pair.second ? reversed : views[pair.second]);
     const int agreeing = again.agreeing[0];
@@ -254,7 +263,7 @@ std::vector<PairEvidence> check_conventions(const camera::Rig& rig, std::span<co
     for (std::size_t j = i + 1; j < rig.size(); ++j) {
       PairEvidence& pair = evidence.emplace_back(judge_views(rig, i, j, views[i], views[j]));
       if (!pair.verdict && pair.instants > 0 && pair.overlap >= kSomeOverlap)
-        pair.mirrored = find_mirrored(rig, pair, frames, views);
+        pair.mirrored = find_mirrored(rig, pair, frames, masks, views);
     }
   }
   return evidence;

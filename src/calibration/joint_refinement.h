@@ -29,9 +29,10 @@ struct JointRefinement {
 };
 
 // Combines estimates from different recordings with priors whose mean is the given calibration: the images are weighted
-// by their information, and the widest of the priors counts once, in any order of the recordings. `refinements`: at
-// least one; all `done`, of the same rig `calibrated` and with intrinsics. Returns nullopt if the information is
-// singular.
+// by their information, and the widest of the priors counts once, in any order of the recordings. A time offset or
+// readout time is the mean, weighted by the inverse variances, of the recordings in which it was refined; if it was in
+// none, that of the last recording. `refinements`: at least one; all `done`, of the same rig `calibrated` (but for its
+// times) and with intrinsics. Returns nullopt if the information is singular.
 std::optional<JointRefinement> combine(const camera::Rig& calibrated, std::span<const RigRefinement> refinements);
 
 }  // namespace bslam::calibration

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdlib>
+#include <iterator>
 #include <string_view>
 #include <utility>
 
@@ -31,6 +32,20 @@ bool are_together(std::span<const image::ImageBundle> triple) {
       return image.state != image::ImageState::kPresent || 4 * std::abs(image.time_ns - frame.time_ns) <= interval_ns;
     });
   });
+}
+
+// The keypoints by camera and frame of the triples whose images were taken together. Single images may have wrong time
+// stamps.
+std::vector<std::vector<View>> views_taken_together(const camera::Rig& rig, std::span<const image::ImageBundle> triples,
+                                                    std::span<const image::Image> masks) {
+  std::vector<std::vector<View>> out(rig.size());
+  for (std::size_t first = 0; first < triples.size(); first += kTriple) {
+    const auto triple = triples.subspan(first, kTriple);
+    if (!are_together(triple)) continue;
+    std::vector<std::vector<View>> views = extract_views(rig, triple, masks);
+    for (std::size_t c = 0; c < rig.size(); ++c) std::ranges::move(views[c], std::back_inserter(out[c]));
+  }
+  return out;
 }
 
 // Matches of images of frame 1 of the first camera and of frame `of_second` of the second one.
@@ -116,11 +131,10 @@ std::optional<LateCamera> find_in_part(const camera::Rig& rig, const std::vector
 
 std::optional<LateCamera> find_late_camera(const camera::Rig& rig, std::span<const image::ImageBundle> triples,
                                            std::span<const image::Image> masks) {
-  for (std::size_t first = 0; first < triples.size(); first += kTriple) {
-    if (!are_together(triples.subspan(first, kTriple))) return std::nullopt;
-  }
-  const std::vector<std::vector<View>> views = extract_views(rig, triples, masks);
-  const std::size_t count = triples.size() / kTriple;
+  const std::vector<std::vector<View>> views = views_taken_together(rig, triples, masks);
+  const std::size_t count = views.front().size() / kTriple;
+  // Cameras that are not triggered together are not compared.
+  if (2 * count < triples.size() / kTriple) return std::nullopt;
   const std::array<Part, 5> parts = {{{"", 0, count},
                                       {"first half", 0, count / 2},
                                       {"last half", count - count / 2, count},

@@ -24,9 +24,10 @@ struct LateCamera {
 };
 
 // Compares images of overlapping cameras at the same frame and one frame apart. `triples`: groups of three consecutive
-// frames. A shift can only be found if the rig moves between frames and the images of a frame were taken at the same
-// time. If several pairs of cameras show a difference, the camera of most of them is returned. If the triples together
-// show none, their halves and quarters at the ends are tested. `masks` as in check_conventions.
+// frames, of which those with images that were not taken at the same time do not count. A shift can only be found if
+// the rig moves between frames, and if half of the triples count. If several pairs of cameras show a difference, the
+// camera of most of them is returned. If the triples together show none, their halves and quarters at the ends are
+// tested. `masks` as in check_conventions.
 std::optional<LateCamera> find_late_camera(const camera::Rig& rig, std::span<const image::ImageBundle> triples,
                                            std::span<const image::Image> masks);
 

@@ -1,6 +1,7 @@
 #include "calibration/lost_observations.h"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 #include "map/search_points.h"
@@ -45,14 +46,44 @@ std::vector<std::vector<Observation>> observations_by_image(const solver::Reproj
   return out;
 }
 
-// Keypoints and points that are excluded from the search in the images of one keyframe.
+// The group of each point of the problem: that of the first pose that observes it. A point without observations belongs
+// to none.
+std::vector<std::optional<std::size_t>> groups_of_points(const RigProblem& problem) {
+  const solver::ReprojectionProblem& bundle = problem.selected.problem;
+  std::vector<std::optional<std::size_t>> out(bundle.points.size());
+  for (const Observation& o : bundle.observations) {
+    auto& group = out[static_cast<std::size_t>(o.point)];
+    if (!group) group = problem.group[static_cast<std::size_t>(o.pose)];
+  }
+  return out;
+}
+
+// Keypoints and points that are excluded from the search in the images of one keyframe. `elsewhere`: flags of the
+// points of other groups.
 std::vector<matching::SearchExclusions> known_in(const map::BundledMap& map, KeyframeId keyframe,
-                                                 std::span<const std::vector<Observation>> seen, std::size_t points) {
+                                                 std::span<const std::vector<Observation>> seen,
+                                                 const std::vector<std::uint8_t>& elsewhere) {
   std::vector<matching::SearchExclusions> out(seen.size());
   for (std::size_t c = 0; c < seen.size(); ++c) {
     out[c].keypoints = taken_keypoints(map, keyframe, CameraIndex(c), seen[c]);
-    out[c].points.resize(points);
+    out[c].points = elsewhere;
     for (const Observation& o : seen[c]) out[c].points[static_cast<std::size_t>(o.point)] = 1;
+  }
+  return out;
+}
+
+// The poses of the cameras of a keyframe when the middle rows of their images were exposed: the capture times with the
+// offsets of `rig`, while the problem has those with the offsets of `of_map`.
+std::vector<geometry::SE3> poses_at_exposure(const camera::Rig& rig, const camera::Rig& of_map,
+                                             const solver::ReprojectionProblem& problem, std::size_t pose) {
+  std::vector<geometry::SE3> out(rig.size());
+  for (std::size_t c = 0; c < rig.size(); ++c) {
+    geometry::SE3 T_rig_world = problem.T_rig_world[pose];
+    const double later_s = to_seconds(rig.camera(c).time_offset_ns - of_map.camera(c).time_offset_ns);
+    if (later_s != 0 && !problem.twist.empty())
+      T_rig_world = geometry::SE3::exp(later_s * problem.twist[pose]) * T_rig_world;
+    if (!problem.motion.empty()) T_rig_world = problem.motion[pose * rig.size() + c] * T_rig_world;
+    out[c] = rig.cam_from_rig(c) * T_rig_world;
   }
   return out;
 }
@@ -60,8 +91,8 @@ std::vector<matching::SearchExclusions> known_in(const map::BundledMap& map, Key
 // Adds the observations of `points` in the images of one keyframe; `T_cam_world`: poses of its cameras.
 void search_keyframe(const map::BundledMap& map, const camera::Rig& rig, std::size_t pose,
                      std::span<const geometry::SE3> T_cam_world, std::span<const matching::SearchPoint> points,
-                     std::span<const std::vector<Observation>> seen, const feature::FeatureModel& features,
-                     adjustment::BundleProblem& selected) {
+                     std::span<const std::vector<Observation>> seen, const std::vector<std::uint8_t>& elsewhere,
+                     const feature::FeatureModel& features, adjustment::BundleProblem& selected) {
   const KeyframeId keyframe = selected.keyframes[pose];
   const frame::BundledFrame& frame = *map.keyframe(keyframe).frame;
   const geometry::Vector6d& twist =
@@ -69,8 +100,8 @@ void search_keyframe(const map::BundledMap& map, const camera::Rig& rig, std::si
   const camera::Rig moving = frame::rig_of(rig, frame, twist);
   const matching::ProjectionSearchOptions options{
       .radius = kRadius, .max_hamming = kMaxHamming, .ratio = kRatio, .scale_factor = features.pyramid.scale_factor};
-  const auto results = matching::search_cameras(moving, frame, T_cam_world, points,
-                                                known_in(map, keyframe, seen, points.size()), options);
+  const auto results =
+      matching::search_cameras(moving, frame, T_cam_world, points, known_in(map, keyframe, seen, elsewhere), options);
   for (std::size_t c = 0; c < results.size(); ++c) {
     const feature::Keypoints& keypoints = frame.cameras[c].keypoints;
     for (const matching::ProjectionMatch& m : results[c].matches) {
@@ -89,22 +120,18 @@ void search_keyframe(const map::BundledMap& map, const camera::Rig& rig, std::si
 }  // namespace
 
 int recover_observations(const map::BundledMap& map, const camera::Rig& rig, const feature::FeatureModel& features,
-                         adjustment::BundleProblem& selected) {
-  const solver::ReprojectionProblem& problem = selected.problem;
-  const std::size_t cameras = rig.size(), before = problem.observations.size();
-  const auto seen = observations_by_image(problem, cameras);
+                         RigProblem& problem) {
+  adjustment::BundleProblem& selected = problem.selected;
+  const std::size_t cameras = rig.size(), before = selected.problem.observations.size();
+  const auto seen = observations_by_image(selected.problem, cameras);
+  const auto group_of = groups_of_points(problem);
   std::vector<matching::SearchPoint> points = map::search_points(map, selected.landmarks);
-  for (std::size_t i = 0; i < points.size(); ++i) points[i].position = problem.points[i];
-  std::vector<geometry::SE3> T_cam_world(cameras);
+  for (std::size_t i = 0; i < points.size(); ++i) points[i].position = selected.problem.points[i];
+  std::vector<std::uint8_t> elsewhere(points.size());
   for (std::size_t pose = 0; pose < selected.keyframes.size(); ++pose) {
-    for (std::size_t c = 0; c < cameras; ++c) {
-      const geometry::SE3 T_rig_world = problem.motion.empty()
-                                            ? problem.T_rig_world[pose]
-                                            : problem.motion[pose * cameras + c] * problem.T_rig_world[pose];
-      T_cam_world[c] = rig.cam_from_rig(c) * T_rig_world;
-    }
-    search_keyframe(map, rig, pose, T_cam_world, points, std::span(seen).subspan(pose * cameras, cameras), features,
-                    selected);
+    for (std::size_t i = 0; i < points.size(); ++i) elsewhere[i] = group_of[i] != problem.group[pose];
+    search_keyframe(map, rig, pose, poses_at_exposure(rig, map.rig(), selected.problem, pose), points,
+                    std::span(seen).subspan(pose * cameras, cameras), elsewhere, features, selected);
   }
   adjustment::sort_observations(selected);
   return static_cast<int>(selected.problem.observations.size() - before);

@@ -16,8 +16,9 @@ constexpr int kMaxCorrections = 3;  // of the times of moves
 // A move is accepted if the camera turned or was displaced by so many standard deviations and more than these bounds.
 // On recordings without moves, the estimates were below 0.035 degrees and 4.5 mm.
 constexpr double kMinMoveSigmas = 6, kMinTurn_deg = 0.04, kMinShift_mm = 5;
-// A move is tried if, with everything else constant, it decreases twice the cost by so much, and its estimate is at
-// least a sixth of a bound: the constant poses and points hide the rest.
+// A move is tried if, with poses and points constant, it decreases twice the cost by at least kMinMoveChi2. Its angle
+// and displacement are then too small, because poses and points were adjusted as if there was no move. They are
+// multiplied by kHidden before they are compared with the bounds above.
 constexpr double kMinMoveChi2 = 50, kHidden = 6;
 
 // Move m of an estimate. `covariance`: of RigInformation::change.

@@ -41,8 +41,10 @@ class MovedCameras {
   // The information about the N cameras, with the extrinsics of the others marginalised out.
   RigInformation of_rig(const RigInformation& information) const;
 
-  // Assigns observations to the added cameras, and assigns them to those of the rig again. Then the motions of the
-  // problem contain the moves according to `values`.
+  // Two forms of one problem. After separate(), which the adjustment needs, the images of a camera after a move are
+  // those of the added camera, which has extrinsics of its own. After join(), which the search for observations needs,
+  // they are those of the camera of the rig again, with its extrinsics before the moves; instead, the motion of the rig
+  // (ReprojectionProblem::motion) for these images contains the move that `values` show.
   void separate(const map::BundledMap& map, RigProblem& problem) const;
   void join(const map::BundledMap& map, const solver::RigValues& values, RigProblem& problem) const;
 

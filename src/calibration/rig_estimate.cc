@@ -54,8 +54,8 @@ int recover(const EstimateInput& input, const MovedCameras& cameras, const solve
             RigProblem& problem) {
   const std::vector<geometry::SE3> motion = problem.selected.problem.motion;
   cameras.join(input.map, values, problem);
-  const int recovered = recover_observations(input.map, cameras.of_rig(values).applied_to(input.map.rig()),
-                                             input.features, problem.selected);
+  const int recovered =
+      recover_observations(input.map, cameras.of_rig(values).applied_to(input.map.rig()), input.features, problem);
   if (cameras.moves().empty()) return recovered;
   problem.selected.problem.motion.clear();
   cameras.separate(input.map, problem);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <utility>
 
 namespace bslam::calibration {
 namespace {
@@ -134,6 +135,43 @@ std::vector<std::size_t> groups(const map::BundledMap& map, const std::vector<Ke
   return group;
 }
 
+// The parts of a problem that are connected by points. The poses of a part have the same root.
+class ConnectedPoses {
+ public:
+  explicit ConnectedPoses(std::size_t poses) : next_(poses) { std::iota(next_.begin(), next_.end(), 0u); }
+
+  std::size_t root(std::size_t pose) {
+    while (next_[pose] != pose) pose = next_[pose] = next_[next_[pose]];
+    return pose;
+  }
+  void connect(std::size_t a, std::size_t b) { next_[root(a)] = root(b); }
+
+ private:
+  std::vector<std::size_t> next_;  // towards the root
+};
+
+// Fixes one pose of each group, and one of every part that observations no longer connect to it.
+void fix_one_of_each_part(RigProblem& problem) {
+  solver::ReprojectionProblem& bundle = problem.selected.problem;
+  const std::size_t poses = problem.group.size();
+  ConnectedPoses parts(poses);
+  std::vector<std::uint8_t> observed(poses, 0), has_fixed(poses, 0);
+  for (std::size_t o = 0; o < bundle.observations.size(); ++o) {
+    const auto pose = static_cast<std::size_t>(bundle.observations[o].pose);
+    observed[pose] = 1;
+    if (o > 0 && bundle.observations[o - 1].point == bundle.observations[o].point)
+      parts.connect(pose, static_cast<std::size_t>(bundle.observations[o - 1].pose));
+  }
+  for (std::size_t pose = 0; pose < poses; ++pose) {
+    bundle.pose_free[pose] = problem.group[pose] != pose;
+    if (!bundle.pose_free[pose]) has_fixed[parts.root(pose)] = 1;
+  }
+  for (std::size_t pose = 0; pose < poses; ++pose) {
+    if (observed[pose] == 0 || std::exchange(has_fixed[parts.root(pose)], std::uint8_t{1}) != 0) continue;
+    bundle.pose_free[pose] = false;
+  }
+}
+
 }  // namespace
 
 RigProblem choose(const map::BundledMap& map, bool timing, const CalibrationOptions& options,
@@ -192,6 +230,7 @@ void separate_groups(RigProblem& problem) {
   }
   observations.resize(kept);
   problem.selected.sources.resize(kept);
+  fix_one_of_each_part(problem);
 }
 
 }  // namespace bslam::calibration

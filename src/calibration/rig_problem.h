@@ -8,7 +8,7 @@
 
 namespace bslam::calibration {
 
-// The adjustment problem and the group of each of its poses.
+// The adjustment problem and the group of each of its poses, by the index of a pose of the group.
 struct RigProblem {
   adjustment::BundleProblem selected;
   std::vector<std::size_t> group;
@@ -27,7 +27,8 @@ std::vector<std::size_t> poses_by_time(const map::BundledMap& map, const RigProb
 
 // Removes the observations of a point by groups other than the one with the most observations (the first one on ties).
 // Otherwise the point would connect two fixed keyframes, and their distance would constrain lengths, which the
-// extrinsics have to determine.
+// extrinsics have to determine. If poses are thereby no longer connected to the fixed one of their group, one of them
+// is fixed as well.
 void separate_groups(RigProblem& problem);
 
 }  // namespace bslam::calibration

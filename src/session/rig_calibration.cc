@@ -126,6 +126,24 @@ Result<camera::Rig> with_nominal_intrinsics(const camera::Rig& rig, const std::s
   return camera::Rig(std::move(cameras));
 }
 
+dataset::Dataset with_times_of(const camera::Rig& timed, dataset::Dataset recording) {
+  std::vector<camera::RigCamera> cameras;
+  bool differ = false;
+  for (std::size_t c = 0; c < recording.rig.size(); ++c) {
+    cameras.push_back({recording.rig.camera(c), recording.rig.body_from_cam(c)});
+    camera::Camera& camera = cameras.back().camera;
+    const TimeNs later_ns = timed.camera(c).time_offset_ns - camera.time_offset_ns;
+    differ |= later_ns != 0 || timed.camera(c).readout_s != camera.readout_s;
+    camera.time_offset_ns += later_ns;
+    camera.readout_s = timed.camera(c).readout_s;
+    for (dataset::FrameEntry& frame : recording.frames) {
+      if (frame.images[c]) frame.images[c]->time_ns += later_ns;
+    }
+  }
+  if (differ) recording.rig = camera::Rig(std::move(cameras), recording.rig.cam_from_rig(0));
+  return recording;
+}
+
 Result<RigCalibration> calibrate_rig(std::span<const dataset::Dataset> recordings,
                                      const RigCalibrationRequest& request) {
   BSLAM_ASSERT(!recordings.empty(), "there must be a recording");
@@ -137,7 +155,7 @@ Result<RigCalibration> calibrate_rig(std::span<const dataset::Dataset> recording
   int runs = 0;
   bool converged = true;
   for (const dataset::Dataset& recording : recordings) {
-    auto passes = run_passes(recording, request, rig);
+    auto passes = run_passes(with_times_of(rig, recording), request, rig);
     if (!passes) return passes.error();
     runs += passes->runs;
     converged = converged && passes->converged;

@@ -48,10 +48,15 @@ system::Config rig_calibration_config();
 // not known: pinhole, pinhole-radtan or kannala-brandt. Error: a field of view that the model does not have.
 Result<camera::Rig> with_nominal_intrinsics(const camera::Rig& rig, const std::string& model, double fov_deg);
 
+// The recording as if its calibration had the time offsets and readout times of `timed`, a rig of the same cameras. The
+// times of its images change with the offsets; its frames keep their images and times.
+dataset::Dataset with_times_of(const camera::Rig& timed, dataset::Dataset recording);
+
 // Runs SLAM on each recording, estimates the calibration from the map, and repeats this with the estimate until it does
 // not change any more, because the first map contains only the matches that the rough calibration permits. The start
-// remains the prior throughout. Estimates from several recordings are combined. The data sets must have the same rig,
-// and `recordings` at least one. Errors: those of run_session; a recording from which nothing can be estimated; an
+// remains the prior throughout, but the times that one recording shows are the prior of those after it, which may be
+// too slow to show them. Estimates from several recordings are combined. The data sets must have the same rig, and
+// `recordings` at least one. Errors: those of run_session; a recording from which nothing can be estimated; an
 // interruption.
 Result<RigCalibration> calibrate_rig(std::span<const dataset::Dataset> recordings,
                                      const RigCalibrationRequest& request);

@@ -12,6 +12,7 @@ using geometry::Matrix6d;
 using geometry::Vector6d;
 
 constexpr double kWiderIfDisplaced = 10.0;
+constexpr double kNoBaseline = 1e-6;  // metres; cameras at one position differ by rounding errors of their poses
 
 // d extrinsic_change / d(left perturbation): exp(w) R has the logarithm phi + J_l^-1 w, its translation is t + w x t +
 // v.
@@ -22,12 +23,13 @@ Matrix6d change_jacobian(const Vector6d& change) {
   return J;
 }
 
-bool is_displaced(const ExtrinsicPrior& prior, std::size_t camera) {
-  return !prior.displaced.empty() && prior.displaced[camera];
-}
-
 std::size_t num_with_baseline(const ExtrinsicPrior& prior) {
   return prior.with_baseline > 0 ? prior.with_baseline : prior.T_cam_rig.size();
+}
+
+// A camera after a move counts as displaced even if too few baselines exist to see it.
+bool is_displaced(const ExtrinsicPrior& prior, std::size_t camera) {
+  return camera >= num_with_baseline(prior) || (!prior.displaced.empty() && prior.displaced[camera]);
 }
 
 // Adds the columns of the next camera, which has `size` unknowns, to those of the cameras before it.
@@ -82,7 +84,7 @@ std::vector<double> baseline_weights(const ExtrinsicPrior& prior) {
   double sum = 0.0;
   for (std::size_t c = 1; c < num_with_baseline(prior); ++c) {
     const Vector3d& t = prior.T_cam_rig[c].translation();
-    if (is_displaced(prior, c) || t.squaredNorm() == 0) continue;
+    if (is_displaced(prior, c) || t.norm() < kNoBaseline) continue;
     out[c] = 1.0 / t.normalized().dot(covariance_of(prior, c).bottomRightCorner<3, 3>() * t.normalized());
     sum += out[c] * t.squaredNorm();
   }
@@ -109,12 +111,12 @@ std::vector<std::uint8_t> displaced_cameras(std::span<const SE3> T_cam_rig, cons
   }
   if (ratios.size() < kMinBaselines) return out;
   const double scale = lower_median(std::move(ratios));
-  for (std::size_t c = 1; c < calibrated.size(); ++c) {
+  for (std::size_t c = 1; c < n; ++c) {
     const Vector3d change = extrinsic_change(geometry::scaled(T_cam_rig[c], 1.0 / scale), calibrated[c]).tail<3>();
     const Eigen::Matrix3d covariance = covariance_of(prior, c).bottomRightCorner<3, 3>();
     out[c] = change.dot(covariance.inverse() * change) > kDeviations * kDeviations;
   }
-  if (2 * std::ranges::count(std::span(out).first(n), std::uint8_t{1}) >= static_cast<std::ptrdiff_t>(n))
+  if (2 * std::ranges::count(out, std::uint8_t{1}) >= static_cast<std::ptrdiff_t>(n))
     std::ranges::fill(out, std::uint8_t{0});
   return out;
 }

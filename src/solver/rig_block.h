@@ -67,8 +67,8 @@ struct ExtrinsicPrior {
   // length looks like a displacement along the axis.
   double sigma_depth = 0;
   double sigma_scale = 0;  // relative standard deviation of the scale; 0: no separate prior
-  // The number of cameras, the first ones, whose baselines count for the scale; 0: all. The others are cameras after a
-  // move, whose distance may have changed.
+  // The number of cameras, the first ones, that are at their calibrated positions; 0: all. The others are cameras after
+  // a move (SharedUnknowns): they may be anywhere near, so that each is taken as displaced.
   std::size_t with_baseline = 0;
   // Per camera: its position is far from the calibrated one. Its translation gets ten times the deviation, and its
   // baseline does not count for the scale. Empty: none.
@@ -79,8 +79,9 @@ struct ExtrinsicPrior {
 geometry::Matrix6d covariance_of(const ExtrinsicPrior& prior, std::size_t camera);
 
 // Weights w_c of the baselines in their common scale, the inverse variance of the calibrated position c' of a camera in
-// the rig frame along the direction of c', divided by sum w_c |c'|^2. 0: camera 0, cameras that are displaced, cameras
-// at the centre of camera 0, and those behind `with_baseline`. Thereby a baseline along an optical axis counts less.
+// the rig frame along the direction of c', divided by sum w_c |c'|^2. 0: camera 0, cameras that are displaced or were
+// moved, and cameras closer than a micrometre to the centre of camera 0. Thereby a baseline along an optical axis
+// counts less.
 std::vector<double> baseline_weights(const ExtrinsicPrior& prior);
 
 // The common scale of the baselines relative to that of the calibration, the root of sum w_c |c|^2 with the estimated
@@ -90,7 +91,8 @@ double baseline_scale(std::span<const SE3> T_cam_rig, std::span<const double> we
 
 // Flags the cameras whose centres are farther than four standard deviations from the calibrated ones, at the scale that
 // half of the baselines do not exceed: with a mean, one camera that was displaced would spoil the scale of all. At
-// least three baselines are needed, and more than half of the cameras are not displaced.
+// least three baselines are needed, and more than half of the cameras are not displaced. Cameras behind `with_baseline`
+// have no flag.
 std::vector<std::uint8_t> displaced_cameras(std::span<const SE3> T_cam_rig, const ExtrinsicPrior& prior);
 
 // Difference of extrinsics to a reference: for D = T_cam_rig reference^-1, the logarithm of the rotation (radians),
@@ -118,8 +120,10 @@ class ExtrinsicsBlock : public RigBlock {
   std::vector<double> baseline_weights_;         // of the common scale; empty without a prior of it
 };
 
-// Per camera: the index of the camera whose unknowns it uses, which is its own or, for a camera after a move, the
-// smaller one of the camera that it is. Empty: every camera has its own.
+// Which cameras have the same intrinsics and timing. If a camera is moved during a recording, the adjustment treats its
+// images after the move as those of a further camera, behind the cameras of the rig: it has a pose of its own, but is
+// the same device. Entry c is the index of the camera whose intrinsics and timing camera c has: c itself for a camera
+// of the rig, and for a further camera the one that was moved. Empty: every camera has its own.
 using SharedUnknowns = std::vector<std::size_t>;
 inline bool has_own_unknowns(const SharedUnknowns& shared, std::size_t camera) {
   return shared.empty() || shared[camera] == camera;

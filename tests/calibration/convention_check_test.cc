@@ -144,6 +144,17 @@ TEST(ConventionCheck, ReportsTheRotationOfACamera) {
             std::string::npos);
 }
 
+// A calibration that is wrong by a tenth of a degree is wrong by more pixels at a high resolution, but not more wrong.
+TEST(ConventionCheck, ToleratesSmallAnglesAtAnyResolution) {
+  const camera::Rig stereo = camera::stereo_rig();
+  const camera::Camera large{"large", camera::Pinhole({3000, 3000, 3199.5, 2399.5}), 6400, 4800, 0, ""};
+  const SE3 rotated(geometry::so3_exp({0.0017, 0, 0}), Eigen::Vector3d::Zero());
+  const camera::Rig rig({{large, stereo.body_from_cam(0)}, {large, stereo.body_from_cam(1)}});
+  const camera::Rig wrong({{large, stereo.body_from_cam(0)}, {large, stereo.body_from_cam(1) * rotated}});
+  const PairEvidence evidence = judged(wrong, views_of(rig));
+  EXPECT_EQ(evidence.verdict, Convention::kAsGiven) << describe_pair(evidence);
+}
+
 TEST(ConventionCheck, ReportsTheDisplacementOfACamera) {
   const camera::Rig rig = camera::stereo_rig();
   const SE3 step = rig.body_from_cam(0).inverse() * rig.body_from_cam(1);

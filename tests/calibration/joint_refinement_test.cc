@@ -27,6 +27,18 @@ struct Pair {
     out.information.information = Eigen::MatrixXd::Identity(size, size) / (std * std);
     return out;
   }
+  // An estimate of the times of camera 1; a deviation of 0 stands for a time that was not refined.
+  RigRefinement with_times(double offset_ms, double offset_std_ms, double readout_ms, double readout_std_ms) const {
+    RigRefinement out = estimate(0, 1);
+    solver::RigValues values = solver::RigValues::of(rig);
+    values.timing[1] = {1e-3 * offset_ms, 1e-3 * readout_ms};
+    out.rig = values.applied_to(rig);
+    out.cameras.resize(2);
+    out.cameras[1].observations = 1000;
+    out.cameras[1].time_offset = {offset_ms, offset_std_ms, offset_std_ms > 0};
+    out.cameras[1].readout = {readout_ms, readout_std_ms, readout_std_ms > 0};
+    return out;
+  }
 };
 
 TEST(JointRefinement, OfOneEstimateIsThatEstimate) {
@@ -55,6 +67,26 @@ TEST(JointRefinement, WeighsEstimatesByTheirInformation) {
   // The information of both, in which the prior counts once.
   EXPECT_NEAR(value.change, 0.03 * 2500 / (1e4 + 2500 - 1), 1e-9);
   EXPECT_NEAR(value.std, 1 / std::sqrt(1e4 + 2500 - 1), 1e-9);
+}
+
+// A recording of slow motion does not show the times that one of fast motion shows, whichever comes first.
+TEST(JointRefinement, TakesTimesFromTheRecordingsThatShowThem) {
+  const Pair pair;
+  const RigRefinement fast = pair.with_times(20, 0.1, 30, 0.2), slow = pair.with_times(0, 0, 0, 0);
+  for (const auto& recordings : {std::vector{fast, slow}, std::vector{slow, fast}, std::vector{fast}}) {
+    const auto joint = combine(pair.rig, recordings);
+    ASSERT_TRUE(joint.has_value());
+    EXPECT_EQ(joint->rig.camera(1u).time_offset_ns, 20'000'000);
+    EXPECT_EQ(joint->rig.camera(1u).readout_s, 0.03);
+    EXPECT_EQ(joint->rig.camera(0u).time_offset_ns, 0);
+  }
+  const auto joint = combine(pair.rig, std::vector{fast, pair.with_times(23, 0.2, 0, 0)});
+  ASSERT_TRUE(joint.has_value());
+  EXPECT_NEAR(to_seconds(joint->rig.camera(1u).time_offset_ns), (4 * 0.020 + 0.023) / 5, 1e-9);
+  EXPECT_EQ(joint->rig.camera(1u).readout_s, 0.03);
+  const auto neither = combine(pair.rig, std::vector{slow, slow});
+  ASSERT_TRUE(neither.has_value());
+  EXPECT_EQ(neither->rig.camera(1u).time_offset_ns, 0);
 }
 
 TEST(JointRefinement, ManyRecordingsOutweighThePrior) {

@@ -161,6 +161,16 @@ TEST(MovedCamera, MayBeDisplacedFar) {
         << c;
 }
 
+// The single baseline of two cameras does not show that the second one is far from its calibrated place.
+TEST(MovedCamera, MayBeDisplacedFarInARigOfTwo) {
+  const Moved moved{1, 15, turn({0, 0, 0}, {0.02, 0, 0})};
+  const RigRefinement result = refined(map_of(synthetic::ring_rig(2), moved));
+  ASSERT_EQ(result.moves.size(), 1u);
+  const Eigen::Vector3d error =
+      result.rig->moves()[0].T_after_initial.translation() - moved.T_after_initial.translation();
+  EXPECT_LT(error.norm(), 0.003) << result.moves[0].change_mm << " mm +- " << result.moves[0].std_mm;
+}
+
 TEST(MovedCamera, CountsItsObservationsBeforeAndAfter) {
   const camera::Rig rig = synthetic::default_rig();
   const RigRefinement still = refined(map_of(rig, {1, kKeyframes, SE3()}));

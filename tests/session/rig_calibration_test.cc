@@ -89,6 +89,26 @@ TEST_F(RigCalibrationOfRecording, CorrectsARoughStart) {
   EXPECT_TRUE(camera::Rig(read->cameras).same_intrinsics(rig));
 }
 
+// What a recording shows of the times of cameras is the prior of the next one.
+TEST_F(RigCalibrationOfRecording, ARecordingGetsTheTimesOfAnotherOne) {
+  constexpr TimeNs kLater = 20'000'000;
+  constexpr double kReadout_s = 0.03;
+  const dataset::Dataset before = opened();
+  solver::RigValues values = solver::RigValues::of(before.rig);
+  values.timing[1] = {to_seconds(kLater), kReadout_s};
+  const dataset::Dataset after = with_times_of(values.applied_to(before.rig), before);
+  EXPECT_EQ(after.rig.camera(0u).time_offset_ns, before.rig.camera(0u).time_offset_ns);
+  EXPECT_EQ(after.rig.camera(1u).time_offset_ns, before.rig.camera(1u).time_offset_ns + kLater);
+  EXPECT_EQ(after.rig.camera(1u).readout_s, kReadout_s);
+  EXPECT_EQ(after.rig.cam_from_rig(1).matrix(), before.rig.cam_from_rig(1).matrix());
+  for (std::size_t f = 0; f < before.frames.size(); ++f) {
+    EXPECT_EQ(after.frames[f].time_ns, before.frames[f].time_ns);
+    EXPECT_EQ(after.frames[f].images[0]->time_ns, before.frames[f].images[0]->time_ns);
+    EXPECT_EQ(after.frames[f].images[1]->time_ns, before.frames[f].images[1]->time_ns + kLater);
+  }
+  EXPECT_TRUE(with_times_of(before.rig, before).rig.same_calibration(before.rig));
+}
+
 TEST(NominalIntrinsics, HaveTheGivenFieldOfView) {
   const camera::Rig rig = synthetic::ring_rig(2, 376);
   for (const char* model : {"pinhole", "pinhole-radtan", "kannala-brandt"}) {

@@ -192,6 +192,18 @@ TEST_F(RigReport, TestsTheExtrinsicsAgainstImages) {
   EXPECT_EQ(mirrored[0].mirrored->camera, 1u);
   EXPECT_NE(calibration::describe_evidence(mirrored).find("warning: the images of camera 1 are mirrored"),
             std::string::npos);
+
+  // A mask belongs to the images as they are. One half of them is black, and the other half is masked.
+  std::vector<image::Image> masks(2);
+  const int width = rig.camera(1u).width, height = rig.camera(1u).height;
+  masks[1] = image::Image(width, height);
+  for (int y = 0; y < height; ++y) {
+    std::fill_n(masks[1].row(y), width / 2, std::uint8_t{255});
+    std::fill_n(masks[1].row(y) + width / 2, width - width / 2, std::uint8_t{0});
+    for (image::ImageBundle& frame : frames) std::fill_n(frame.images[1].image.row(y), width / 2, std::uint8_t{0});
+  }
+  EXPECT_TRUE(calibration::check_conventions(rig, frames, std::vector<image::Image>(2))[0].mirrored);
+  EXPECT_FALSE(calibration::check_conventions(rig, frames, masks)[0].mirrored);
 }
 
 // A camera loses a frame in the middle of a recording, and its further images are renumbered.
@@ -219,6 +231,15 @@ TEST_F(RigReport, ACameraThatBecomesLateIsFound) {
   ASSERT_TRUE(found);
   EXPECT_EQ(found->part, "last half");
   EXPECT_TRUE(found->early);
+
+  // Some images have wrong time stamps.
+  constexpr TimeNs kWrong = 60'000'000;
+  late.front().images[1].time_ns += kWrong;
+  const auto despite = calibration::find_late_camera(data->rig, late, masks);
+  ASSERT_TRUE(despite);
+  EXPECT_TRUE(despite->early);
+  for (std::size_t k = 0; k < late.size(); k += 3) late[k].images[1].time_ns += kWrong;
+  EXPECT_FALSE(calibration::find_late_camera(data->rig, late, masks));
 }
 
 }  // namespace
