@@ -285,11 +285,12 @@ void refer_to(KeyframeId keyframe, const frame::BundledFrame& frame, std::vector
 bool keyframe_due(const KeyframeEvidence& e, const KeyframeOptions& options) {
   if (e.frames_since_keyframe < options.min_interval) return false;
   const double overlap = static_cast<double>(e.overlap) / std::max(1, e.best_overlap);
-  if (overlap < options.min_overlap || e.parallax > options.max_parallax || e.untracked_depth) return true;
-  const bool at_rest = e.parallax < kRestMaxParallax && overlap > kRestMinOverlap;
+  if (overlap < options.min_overlap || e.parallax > options.max_parallax) return true;
+  // At rest a keyframe would add nothing: what it has not tracked, such as leaves in the wind, it will not track.
+  if (e.parallax < kRestMaxParallax && overlap > kRestMinOverlap) return false;
   const int few_inliers_interval = e.without_newest ? kFewInliersInterval / 2 : kFewInliersInterval;
-  if (e.camera_with_few_inliers && e.frames_since_keyframe >= few_inliers_interval && !at_rest) return true;
-  return e.frames_since_keyframe >= options.max_interval && !at_rest;
+  if (e.camera_with_few_inliers && e.frames_since_keyframe >= few_inliers_interval) return true;
+  return e.untracked_depth || e.frames_since_keyframe >= options.max_interval;
 }
 
 std::optional<KeyframeId> similar_keyframe(const map::BundledMap& map, const frame::BundledFrame& frame,

@@ -42,6 +42,17 @@ TEST(KeyframeDecision, DueIfManyFeaturesWithDepthAreUntracked) {
   EXPECT_TRUE(keyframe_due(e, kOptions));
 }
 
+// Leaves that move in the wind while the rig waits are untracked in every frame.
+TEST(KeyframeDecision, NotDueAtRestAlthoughManyFeaturesWithDepthAreUntracked) {
+  KeyframeEvidence e = calm();
+  e.untracked_depth = true;
+  e.parallax = 0.001;
+  e.overlap = 99;
+  EXPECT_FALSE(keyframe_due(e, kOptions));
+  e.overlap = 90;  // the view has changed
+  EXPECT_TRUE(keyframe_due(e, kOptions));
+}
+
 TEST(KeyframeDecision, NeverDueWithinTheMinimumInterval) {
   KeyframeEvidence e;
   e.parallax = 1;
