@@ -92,12 +92,18 @@ PairRotation solve(const EpipolarPose& given, std::span<const BearingPair> pairs
   return out;
 }
 
+// The bearing with the focal length of camera b that an estimate of its relative error gives.
+Eigen::Vector3d refocused(const Eigen::Vector3d& b, double focal_error) {
+  return (b - focal_error * Eigen::Vector3d(b.x(), b.y(), 0)).normalized();
+}
+
 // The rotation about the disparity axis, on the left of `correction`, that brings to infinity the matches that are on
 // their epipolar planes but behind the cameras, i.e. beyond parallel; 0 if they are so few that they may be wrong
-// matches, or so many that the cameras may be exchanged. Twice their median is insensitive to wrong ones among them, as
-// the largest angle is not.
+// matches, or so many that the cameras may be exchanged. The farthest angle is estimated from the tolerance, which
+// those behind exceed, and their median: it is insensitive to wrong ones among them, as the largest angle is not. A
+// wrong focal length brings matches behind the cameras as well, at one side of the image.
 double rotation_to_front(const EpipolarPose& pose, std::span<const BearingPair> pairs, const Eigen::Vector3d& axis,
-                         double tolerance) {
+                         double focal_error, double tolerance) {
   constexpr double kFew = 0.05, kMany = 0.85;  // fractions of the matches on their planes
   std::size_t on_plane = 0;
   std::vector<double> behind;  // angles from the parallel of a to b, rad, negative behind the cameras
@@ -105,13 +111,14 @@ double rotation_to_front(const EpipolarPose& pose, std::span<const BearingPair> 
     const Eigen::Vector3d parallel = pose.R_b_a * pair.a;
     if (geometry::angle_between(parallel, pair.b) >= tolerance && epipolar_angle(pose, pair) >= tolerance) continue;
     const Eigen::Vector3d a = (parallel - axis.dot(parallel) * axis).stableNormalized();
-    const Eigen::Vector3d b = (pair.b - axis.dot(pair.b) * axis).stableNormalized();
+    const Eigen::Vector3d bearing = refocused(pair.b, focal_error);
+    const Eigen::Vector3d b = (bearing - axis.dot(bearing) * axis).stableNormalized();
     const double angle = std::atan2(axis.dot(a.cross(b)), a.dot(b));
     ++on_plane;
     if (angle < -tolerance) behind.push_back(angle);
   }
   const double fraction = static_cast<double>(behind.size()) / static_cast<double>(std::max<std::size_t>(1, on_plane));
-  return fraction > kFew && fraction < kMany ? 2.0 * median(std::move(behind)) : 0.0;
+  return fraction > kFew && fraction < kMany ? 2.0 * median(std::move(behind)) + tolerance : 0.0;
 }
 
 }  // namespace
@@ -135,7 +142,8 @@ PairRotation pair_rotation(const EpipolarPose& given, std::span<const BearingPai
   const std::vector<PlaneMatch> matches = plane_matches(given, pairs);
   const Eigen::Vector3d axis = disparity_axis(given, matches);
   PairRotation kept = solve(given, pairs, matches, axis, options);
-  const double angle = rotation_to_front(corrected(given, kept.correction), pairs, axis, options.tolerance);
+  const double angle =
+      rotation_to_front(corrected(given, kept.correction), pairs, axis, kept.focal_error, options.tolerance);
   if (angle != 0.0) {
     kept.brought_to_front = true;
     kept.correction = geometry::so3_exp(angle * axis).toRotationMatrix() * kept.correction;

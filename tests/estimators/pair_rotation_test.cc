@@ -91,6 +91,19 @@ TEST(PairRotation, BringsPointsBehindTheCamerasToInfinity) {
   }
 }
 
+// At one side of the image it brings far points behind the cameras, by more than their disparities.
+TEST(PairRotation, AWrongFocalLengthIsNotTakenForARotationThatBringsPointsBehindTheCameras) {
+  Random random(9);
+  const EpipolarPose given{Eigen::Matrix3d::Identity(), -Eigen::Vector3d::UnitX()};
+  std::vector<BearingPair> pairs = matches_of(given, 0.11, 10, random);
+  for (BearingPair& pair : pairs) {
+    const double x = pair.b.x() / pair.b.z(), y = pair.b.y() / pair.b.z();
+    pair.b = Eigen::Vector3d(1.03 * x, 1.03 * y, 1).normalized();
+  }
+  const PairRotation found = pair_rotation(given, pairs, {.tolerance = 2e-3});
+  EXPECT_LT(geometry::so3_log(Eigen::Quaterniond(found.correction)).norm(), geometry::radians(0.15));
+}
+
 TEST(PairRotation, DoesNotChangeDisparitiesIfNoPointIsBehindTheCameras) {
   Random random(8);
   const EpipolarPose given{Eigen::Matrix3d::Identity(), -Eigen::Vector3d::UnitX()};
