@@ -34,7 +34,7 @@ camera::CameraTiming timing_of(const camera::Rig& calibrated, std::span<const Ri
   camera::CameraTiming out{0, calibrated.camera(c).readout_s};
   WeightedMean shift_s, readout_s;
   for (const RigRefinement& r : refinements) {
-    if (!r.rig) continue;
+    if (!r.rig || r.cameras.empty()) continue;
     out = {to_seconds(r.rig->camera(c).time_offset_ns - calibrated.camera(c).time_offset_ns),
            r.rig->camera(c).readout_s};
     const TimeRefinement &offset = r.cameras[c].time_offset, &readout = r.cameras[c].readout;

@@ -32,6 +32,7 @@ geometry::SE3 unobserved_extrinsics(const camera::Rig& given, std::size_t c, con
 
 void complete_unobserved_cameras(const camera::Rig& given, RigAdjustment& adjusted) {
   solver::RigValues& values = adjusted.values;
+  const Eigen::LLT<Eigen::MatrixXd> prior(adjusted.information.prior);
   for (std::size_t c = 1; c < given.size(); ++c) {
     CameraEstimate& camera = adjusted.cameras[c];
     if (camera.observations >= kMinCameraObservations) continue;
@@ -39,7 +40,8 @@ void complete_unobserved_cameras(const camera::Rig& given, RigAdjustment& adjust
     forget_extrinsics(c, adjusted.information);
     const auto at = static_cast<Eigen::Index>(6 * (c - 1)), n = adjusted.information.prior.rows();
     camera.change = solver::extrinsic_change(values.T_cam_rig[c], given.cam_from_rig(c));
-    camera.covariance = adjusted.information.prior.llt().solve(Eigen::MatrixXd::Identity(n, n)).block<6, 6>(at, at);
+    if (prior.info() == Eigen::Success)
+      camera.covariance = prior.solve(Eigen::MatrixXd::Identity(n, n)).block<6, 6>(at, at);
     camera.observed = {};
     camera.unobserved_shift = camera.change.tail<3>().norm();
   }

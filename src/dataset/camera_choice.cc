@@ -51,11 +51,12 @@ bool are_numbers_in(const std::vector<int>& numbers, const camera::Rig& rig) {
   return largest < static_cast<int>(std::max(rig.size(), numbers.size()));
 }
 
-// Returns nullopt if the recording has no numbers, or those of another rig.
+// Returns nullopt if the recording has no numbers of the rig.
 std::optional<CameraPlaces> places_by_number(const std::vector<int>& numbers, const camera::Rig& rig) {
   if (numbers.empty() || !are_numbers_in(numbers, rig)) return std::nullopt;
   CameraPlaces places;
   for (std::size_t c = 0; c < rig.size(); ++c) places.of_cameras.push_back(place_of(static_cast<int>(c), numbers));
+  if (std::ranges::none_of(places.of_cameras, is_found)) return std::nullopt;
   return places;
 }
 

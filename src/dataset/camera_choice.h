@@ -33,8 +33,8 @@ struct RecordedCameras {
 
 // Finds `cameras` of a rig in a recording: by the names of the cameras in those of folders or topics; or else by the
 // numbers with which they were recorded, if these are numbers of the rig and no name contradicts them; or else in their
-// order. Without names and
-// numbers, the recording may also have the selected cameras only, if it is of one camera or its order was requested.
+// order. Without names and numbers, the recording may also have the selected cameras only, if it is of one camera or
+// its order was requested.
 // Errors: folders or topics of which only some have the names of cameras; folders with names of their own that are not
 // as many as the rig has cameras; numbers of another rig; more topics than the rig has cameras; no images of a camera.
 Result<RecordedCameras> recorded_cameras(const DatasetRequest& request, const Recording& recording,

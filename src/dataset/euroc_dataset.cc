@@ -82,8 +82,7 @@ class EurocRecording : public Recording {
 
   // bslam simulate numbers the folders in the order of the rig, whose cameras may have other names.
   std::vector<std::string> folder_names() const override {
-    std::vector<std::string> names;
-    for (const fs::path& folder : folders_) names.push_back(folder.filename().string());
+    std::vector<std::string> names = names_on_disk();
     std::error_code error;
     const fs::path data = root_.parent_path();
     if (!fs::exists(data / rig_formats::kComplete, error)) return names;
@@ -95,11 +94,7 @@ class EurocRecording : public Recording {
     }
     return names;
   }
-  std::vector<int> recorded_numbers() const override {
-    std::vector<std::string> names;
-    for (const fs::path& folder : folders_) names.push_back(folder.filename().string());
-    return folder_numbers(names);
-  }
+  std::vector<int> recorded_numbers() const override { return folder_numbers(names_on_disk()); }
 
   std::optional<fs::path> ground_truth() const override {
     fs::path file = root_ / "state_groundtruth_estimate0" / "data.csv";
@@ -110,6 +105,12 @@ class EurocRecording : public Recording {
   }
 
  private:
+  std::vector<std::string> names_on_disk() const {
+    std::vector<std::string> names;
+    for (const fs::path& folder : folders_) names.push_back(folder.filename().string());
+    return names;
+  }
+
   fs::path root_;
   std::vector<fs::path> folders_;
 };

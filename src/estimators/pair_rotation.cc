@@ -108,11 +108,11 @@ double rotation_to_front(const EpipolarPose& pose, std::span<const BearingPair> 
   std::size_t on_plane = 0;
   std::vector<double> behind;  // angles from the parallel of a to b, rad, negative behind the cameras
   for (const BearingPair& pair : pairs) {
-    const Eigen::Vector3d parallel = pose.R_b_a * pair.a;
-    if (geometry::angle_between(parallel, pair.b) >= tolerance && epipolar_angle(pose, pair) >= tolerance) continue;
+    const BearingPair match{pair.a, refocused(pair.b, focal_error)};
+    const Eigen::Vector3d parallel = pose.R_b_a * match.a;
+    if (geometry::angle_between(parallel, match.b) >= tolerance && epipolar_angle(pose, match) >= tolerance) continue;
     const Eigen::Vector3d a = (parallel - axis.dot(parallel) * axis).stableNormalized();
-    const Eigen::Vector3d bearing = refocused(pair.b, focal_error);
-    const Eigen::Vector3d b = (bearing - axis.dot(bearing) * axis).stableNormalized();
+    const Eigen::Vector3d b = (match.b - axis.dot(match.b) * axis).stableNormalized();
     const double angle = std::atan2(axis.dot(a.cross(b)), a.dot(b));
     ++on_plane;
     if (angle < -tolerance) behind.push_back(angle);

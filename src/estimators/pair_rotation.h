@@ -37,7 +37,7 @@ EpipolarAgreement epipolar_agreement(const EpipolarPose& pose, std::span<const B
 // lengths is estimated as well, so that it is not taken for a rotation. The rotation about the axis that is
 // perpendicular to the baseline and the view changes mainly disparities. Small errors of the intrinsics, which are
 // common to all matches, look like a large one of it, so that it stays as given unless clearly more matches agree with
-// another one, or several matches are behind the cameras: the farthest of these are then brought to infinity. More than
+// another one, or several matches are behind the cameras: these are then brought to about infinity. More than
 // half of the pairs must be correct.
 PairRotation pair_rotation(const EpipolarPose& given, std::span<const BearingPair> pairs,
                            const PairRotationOptions& options);

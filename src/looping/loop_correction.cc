@@ -80,6 +80,7 @@ double way_between(const map::BundledMap& map, KeyframeId from, KeyframeId to, i
     next.pop();
     if (r.length >= shortest[r.vertex]) continue;
     shortest[r.vertex] = r.length;
+    if (graph.keyframes[r.vertex] == to) break;
     for (const Edge& e : edges[r.vertex]) next.push({r.length + e.length, e.to});
   }
   return shortest[static_cast<std::size_t>(graph.vertex(to))];
@@ -231,9 +232,10 @@ bool plausible(const map::BundledMap& map, const LoopClosure& closure, const Loo
   if (closure.relative_distance > options.max_distance_over_depth || closure.rotation_correction > kMaxRotation)
     return false;
   const double share = map.scale() == map::Scale::kMetric ? options.max_drift : options.max_drift_free;
-  const double way = way_between(map, closure.keyframe, closure.matched_keyframe, options.edge_weight) +
-                     map::median_depth(map, closure.keyframe);
-  return closure.translation_correction <= share * way;
+  const double depth = map::median_depth(map, closure.keyframe);
+  if (closure.translation_correction <= share * depth) return true;
+  const double way = way_between(map, closure.keyframe, closure.matched_keyframe, options.edge_weight);
+  return closure.translation_correction <= share * (way + depth);
 }
 
 void merge_submaps(const LoopClosure& closure, const PlaceMatch& place_match, const LoopOptions& options,

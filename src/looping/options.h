@@ -88,8 +88,9 @@ struct LoopOptions {
   // Maximum distance to the matched keyframe over the median distance to the matched landmarks; farther away is no
   // revisit.
   double max_distance_over_depth = 0.2;
-  // Maximum translation of the correction, relative to the length of the shortest way to the place through keyframes
-  // with common landmarks plus the median depth of the scene; a larger one is a false match, not drift.
+  // Maximum translation of the correction, relative to the length of the shortest way to the place along the edges of
+  // the pose graph (the spanning tree, and edge_weight) plus the median depth of the scene; a larger one is a false
+  // match, not drift.
   double max_drift = 0.05;
   double max_drift_free = 0.3;  // the same maximum in maps whose scale is not metric
   // In metric maps, loops with a smaller reprojection error are corrected without a pose graph.
@@ -112,9 +113,10 @@ struct LoopOptions {
     visitor("max_distance_over_depth", self.max_distance_over_depth, Range{0, 100}, "",
             "maximum distance to the matched keyframe over the median distance to the matched landmarks",
             OptionNote{.formerly = "max_apart"});
-    visitor("max_drift", self.max_drift, Range{0, 10}, "",
-            "maximum correction relative to the length of the shortest way to the place through keyframes with common "
-            "landmarks, plus the scene depth");
+    visitor(
+        "max_drift", self.max_drift, Range{0, 10}, "",
+        "maximum correction relative to the length of the shortest way to the place along the edges of the pose graph, "
+        "plus the scene depth");
     visitor("max_drift_free", self.max_drift_free, Range{0, 10}, "", "max_drift in maps whose scale is not metric");
     visitor("max_bundle_error_px", self.max_bundle_error_px, Range{0, 1000}, "px",
             "reprojection error up to which a loop of a metric map is corrected without a pose graph",

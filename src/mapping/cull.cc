@@ -85,9 +85,11 @@ void cull_landmarks(KeyframeId newest, const CullingOptions& options, map::MapDr
     const int age = newest.value() - l.born.value();
     if (age > kLongest * options.probation) break;
     const int seen = since.with_images_of(l.reference.keypoint.camera, l.born);
-    if (seen > options.probation) continue;
+    const bool last = age == kLongest * options.probation;
+    // A keyframe that is removed may raise the number by more than one, past the end of the probation.
+    if (seen > options.probation && !(last && seen < age)) continue;
     const bool rarely_matched = l.expected > 3 && l.found < options.min_found_ratio * l.expected;
-    const bool ends = seen == options.probation || age == kLongest * options.probation;
+    const bool ends = seen == options.probation || last;
     const bool few_keypoints = ends && num_keypoints(map, id) < options.min_keypoints;
     if (rarely_matched || few_keypoints) bad.push_back(id);
   }

@@ -4,7 +4,7 @@ namespace bslam::mapping {
 namespace {
 
 constexpr double kMaxLinear_s = 0.5;    // longest interval in which the velocity is assumed to change linearly
-constexpr double kMaxInterval_s = 1.5;  // longest interval of which the mean velocity is closer to it than zero
+constexpr double kMaxInterval_s = 1.5;  // up to here the mean velocity is a better guess than zero
 
 }  // namespace
 

@@ -119,8 +119,8 @@ ImageFaults CameraMonitor::examine(const image::ImageBundle& images, ThreadPool&
     Camera& camera = cameras_[c];
     const bool missing = outage == CameraReason::kNoImages;
     camera.missed = missing ? camera.missed + 1 : 0;
-    if (!missing) camera.last_image_ns = images.time_ns;
-    const double missing_s = to_seconds(images.time_ns - camera.last_image_ns);
+    if (!missing || !camera.last_image_ns) camera.last_image_ns = images.time_ns;
+    const double missing_s = to_seconds(images.time_ns - *camera.last_image_ns);
     faults.failing.push_back(missing ? camera.missed > kMaxMissedFrames && missing_s > kMaxMissed_s
                                      : outage != CameraReason::kNone);
   }

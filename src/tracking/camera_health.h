@@ -88,9 +88,9 @@ class CameraMonitor {
     int good = 0;                               // consecutive good images since
     int repeated = 0;                           // images that were identical to the one before, since then
     bool blurred = false;
-    int sharp = 0;   // consecutive sharp images
-    int missed = 0;  // frames since its last image
-    TimeNs last_image_ns = 0;
+    int sharp = 0;                        // consecutive sharp images
+    int missed = 0;                       // frames since its last image
+    std::optional<TimeNs> last_image_ns;  // time of its last image, or of the first frame
   };
   const HealthOptions options_;
   std::vector<Camera> cameras_;

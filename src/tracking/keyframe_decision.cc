@@ -236,7 +236,12 @@ KeyframeEvidence keyframe_evidence(const map::BundledMap& map, const frame::Bund
   std::vector<double> parallaxes =
       parallaxes_to(map, landmarks, reference, T_rig_world.inverse(), map.resolved_pose(reference).inverse());
   evidence.overlap = static_cast<int>(parallaxes.size());
-  if (!parallaxes.empty()) evidence.parallax = median(std::move(parallaxes));
+  if (!parallaxes.empty()) {
+    const auto near = parallaxes.begin() + static_cast<std::ptrdiff_t>(9 * parallaxes.size() / 10);
+    std::nth_element(parallaxes.begin(), near, parallaxes.end());
+    evidence.near_parallax = *near;
+    evidence.parallax = median(std::move(parallaxes));
+  }
   for (std::size_t c = 0; c < inliers.size(); ++c) {
     if (!cameras.empty() && cameras[c] == 0) continue;
     const auto keypoints = static_cast<double>(frame.cameras[c].keypoints.size());
@@ -286,11 +291,13 @@ bool keyframe_due(const KeyframeEvidence& e, const KeyframeOptions& options) {
   if (e.frames_since_keyframe < options.min_interval) return false;
   const double overlap = static_cast<double>(e.overlap) / std::max(1, e.best_overlap);
   if (overlap < options.min_overlap || e.parallax > options.max_parallax) return true;
-  // At rest a keyframe would add nothing: what it has not tracked, such as leaves in the wind, it will not track.
-  if (e.parallax < kRestMaxParallax && overlap > kRestMinOverlap) return false;
+  const bool at_rest = e.parallax < kRestMaxParallax && overlap > kRestMinOverlap;
+  // What a rig at rest has not tracked, such as leaves in the wind, it will not track from another keyframe either. On
+  // a drive most landmarks may be too far away to show the motion.
+  if (e.untracked_depth && (!at_rest || e.near_parallax >= kRestMaxParallax)) return true;
   const int few_inliers_interval = e.without_newest ? kFewInliersInterval / 2 : kFewInliersInterval;
-  if (e.camera_with_few_inliers && e.frames_since_keyframe >= few_inliers_interval) return true;
-  return e.untracked_depth || e.frames_since_keyframe >= options.max_interval;
+  if (e.camera_with_few_inliers && e.frames_since_keyframe >= few_inliers_interval && !at_rest) return true;
+  return e.frames_since_keyframe >= options.max_interval && !at_rest;
 }
 
 std::optional<KeyframeId> similar_keyframe(const map::BundledMap& map, const frame::BundledFrame& frame,

@@ -34,9 +34,10 @@ struct CameraReference {
 
 struct KeyframeEvidence {
   int frames_since_keyframe = 0;
-  int overlap = 0;       // landmarks of the reference keyframe among the inliers
-  int best_overlap = 0;  // maximum overlap of a frame since the keyframe
-  double parallax = 0;   // rad, median angle at these landmarks between the rays to the reference and to this frame
+  int overlap = 0;           // landmarks of the reference keyframe among the inliers
+  int best_overlap = 0;      // maximum overlap of a frame since the keyframe
+  double parallax = 0;       // rad, median angle at these landmarks between the rays to the reference and to this frame
+  double near_parallax = 0;  // rad, the angle that a tenth of them exceeds, as near landmarks do
   bool camera_with_few_inliers = false;  // some camera with keypoints has too few inliers
   bool without_newest = false;           // the newest keyframe has no image of the cameras that are compared
   // Few features with accurate depth are tracked, and many are not yet landmarks: a keyframe would create new metric

@@ -88,9 +88,12 @@ class PoseChoice {
     if (!other.ok) return;
     const Support of_other = support_of(other);
     candidates_.push_back({std::move(other), of_other});
-    if (!best().ok) best_ = candidates_.size() - 1;
+    if (!best().ok || clearly_better(candidates_.back())) {
+      best_ = candidates_.size() - 1;
+      return;
+    }
     // Of three motions, each changes the comparison of the other two.
-    for (std::size_t k = candidates_.size(); k-- > 0;) {
+    for (std::size_t k = candidates_.size() - 1; k-- > 0;) {
       if (k != best_ && candidates_[k].solution.ok && clearly_better(candidates_[k])) best_ = k;
     }
   }
@@ -181,6 +184,7 @@ class PoseChoice {
     std::vector<std::uint8_t> outlier(best().inlier.size());
     for (std::size_t i = 0; i < outlier.size(); ++i) outlier[i] = best().inlier[i] == 0;
     for (const Candidate& third : candidates_) {
+      if (!third.solution.ok) continue;
       const std::vector<std::uint8_t>& inlier = third.solution.inlier;
       std::size_t of_third = 0;
       for (std::size_t i = 0; i < inlier.size(); ++i)

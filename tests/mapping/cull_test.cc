@@ -88,6 +88,23 @@ TEST_F(Cull, ProbationCountsKeyframesWithImagesOfTheCamera) {
   }
 }
 
+// The removed keyframe counts as if it had an image of camera 1, so that two more have one from one keyframe to the
+// next.
+TEST_F(Cull, ProbationEndsAlthoughAKeyframeWasRemoved) {
+  const KeyframeId k = add_keyframe();
+  const FeatureId last(static_cast<std::int32_t>(map.keyframe(k).frame->bundled.size()) - 1);
+  const LandmarkId of_1 = add_landmark({{k, last}});
+  for (int age = 1; age <= 4 * options.probation; ++age) {
+    auto frame = std::make_shared<frame::BundledFrame>(*map::synthetic_frame(random, 2, kKeypoints, kMatched));
+    if (age % 3 != 0) frame->cameras[1].keypoints = {};
+    map.add_keyframe(frame, map::random_pose(random, 0.5), {}, map.newest_keyframe());
+    if (age == 9) map.remove_keyframe(KeyframeId(4));
+    map::MapDraft d = draft();
+    cull_landmarks(map.newest_keyframe(), options, d);
+    EXPECT_EQ(d.map().alive(of_1), age < 4 * options.probation) << age;
+  }
+}
+
 // A camera that has failed.
 TEST_F(Cull, ProbationEndsWithoutFurtherImages) {
   const KeyframeId k = add_keyframe();

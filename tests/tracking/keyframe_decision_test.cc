@@ -49,6 +49,9 @@ TEST(KeyframeDecision, NotDueAtRestAlthoughManyFeaturesWithDepthAreUntracked) {
   e.parallax = 0.001;
   e.overlap = 99;
   EXPECT_FALSE(keyframe_due(e, kOptions));
+  e.near_parallax = 0.02;  // on a drive among far landmarks
+  EXPECT_TRUE(keyframe_due(e, kOptions));
+  e.near_parallax = 0.001;
   e.overlap = 90;  // the view has changed
   EXPECT_TRUE(keyframe_due(e, kOptions));
 }
