@@ -4,6 +4,8 @@
 #include <numeric>
 #include <utility>
 
+#include "base/disjoint_sets.h"
+
 namespace bslam::calibration {
 namespace {
 
@@ -118,8 +120,7 @@ Sightings sightings(const map::BundledMap& map, const std::vector<KeyframeId>& k
 std::vector<std::size_t> groups(const map::BundledMap& map, const std::vector<KeyframeId>& keyframes,
                                 const std::vector<LandmarkId>& landmarks) {
   const Sightings seen = sightings(map, keyframes, landmarks);
-  std::vector<std::size_t> group(keyframes.size());
-  std::iota(group.begin(), group.end(), 0u);
+  DisjointSets sets(keyframes.size());
   std::vector<int> shared(keyframes.size());
   for (std::size_t a = 0; a < keyframes.size(); ++a) {
     std::fill(shared.begin(), shared.end(), 0);
@@ -127,40 +128,25 @@ std::vector<std::size_t> groups(const map::BundledMap& map, const std::vector<Ke
       for (const std::size_t b : seen.keyframes_of_landmark[l]) ++shared[b];
     }
     for (std::size_t b = a + 1; b < keyframes.size(); ++b) {
-      if (shared[b] < kMinShared || group[a] == group[b]) continue;
-      const std::size_t kept = std::min(group[a], group[b]), gone = std::max(group[a], group[b]);
-      std::replace(group.begin(), group.end(), gone, kept);
+      if (shared[b] >= kMinShared) sets.join(a, b);
     }
   }
+  std::vector<std::size_t> group(keyframes.size());
+  for (std::size_t k = 0; k < group.size(); ++k) group[k] = sets.root(k);
   return group;
 }
-
-// The parts of a problem that are connected by points. The poses of a part have the same root.
-class ConnectedPoses {
- public:
-  explicit ConnectedPoses(std::size_t poses) : next_(poses) { std::iota(next_.begin(), next_.end(), 0u); }
-
-  std::size_t root(std::size_t pose) {
-    while (next_[pose] != pose) pose = next_[pose] = next_[next_[pose]];
-    return pose;
-  }
-  void connect(std::size_t a, std::size_t b) { next_[root(a)] = root(b); }
-
- private:
-  std::vector<std::size_t> next_;  // towards the root
-};
 
 // Fixes one pose of each group, and one of every part that observations no longer connect to it.
 void fix_one_of_each_part(RigProblem& problem) {
   solver::ReprojectionProblem& bundle = problem.selected.problem;
   const std::size_t poses = problem.group.size();
-  ConnectedPoses parts(poses);
+  DisjointSets parts(poses);
   std::vector<std::uint8_t> observed(poses, 0), has_fixed(poses, 0);
   for (std::size_t o = 0; o < bundle.observations.size(); ++o) {
     const auto pose = static_cast<std::size_t>(bundle.observations[o].pose);
     observed[pose] = 1;
     if (o > 0 && bundle.observations[o - 1].point == bundle.observations[o].point)
-      parts.connect(pose, static_cast<std::size_t>(bundle.observations[o - 1].pose));
+      parts.join(pose, static_cast<std::size_t>(bundle.observations[o - 1].pose));
   }
   for (std::size_t pose = 0; pose < poses; ++pose) {
     bundle.pose_free[pose] = problem.group[pose] != pose;

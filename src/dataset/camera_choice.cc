@@ -33,9 +33,8 @@ int place_of(const T& value, const std::vector<T>& in) {
 }
 
 // Returns nullopt unless a folder or topic has the name of a camera.
-std::optional<CameraPlaces> places_by_name(const DatasetRequest& request, const Recording& recording,
+std::optional<CameraPlaces> places_by_name(const std::vector<std::string>& folders, const Recording& recording,
                                            const camera::Rig& rig) {
-  const auto folders = request.topics.empty() ? recording.folder_names() : std::vector<std::string>();
   for (const std::vector<std::string>& names : {folders, recording.names_in_topics()}) {
     CameraPlaces places{.of_cameras = {}, .by_name = true};
     for (std::size_t c = 0; c < rig.size(); ++c) places.of_cameras.push_back(place_of(rig.camera(c).name, names));
@@ -185,14 +184,15 @@ std::optional<fs::path> rig_file_in_folder(const DatasetRequest& request) {
 
 Result<RecordedCameras> recorded_cameras(const DatasetRequest& request, const Recording& recording,
                                          const camera::Rig& rig, const std::vector<int>& cameras) {
-  const std::vector<std::string> topics = recording.topics(), folders = recording.folder_names();
+  const std::vector<std::string> topics = recording.topics();
+  const auto folders = request.topics.empty() ? recording.folder_names() : std::vector<std::string>();
   const std::vector<int> numbers = recording.recorded_numbers();
-  auto places = places_by_name(request, recording, rig);
+  auto places = places_by_name(folders, recording, rig);
   const auto has = [&](int camera) { return places->has(camera); };
   const bool all_named = places && std::ranges::all_of(cameras, has);
   if (!all_named && topics.size() > rig.size()) return unknown_topics(request, topics, rig);
   const bool only_selected = !places && numbers.empty() && are_those_selected(request, recording, cameras);
-  const bool own_names = request.topics.empty() && recording.has_own_names() && !folders.empty();
+  const bool own_names = recording.has_own_names() && !folders.empty();
   if (own_names && !all_named && !only_selected && (places || folders.size() != rig.size()))
     return unknown_order(request, recording, folders, rig);
   const auto by_number = places_by_number(numbers, rig);

@@ -31,6 +31,12 @@ struct Estimate {
   double focal_error = 0;
 };
 
+// The derivative of a bearing of camera b with respect to the logarithm of a factor by which its image is enlarged.
+Eigen::Vector3d outward(const Eigen::Vector3d& b) { return {b.x(), b.y(), 0}; }
+
+// The bearing with the focal length that an estimate of its relative error gives, not of unit length.
+Eigen::Vector3d refocused(const Eigen::Vector3d& b, double focal_error) { return b - focal_error * outward(b); }
+
 // The axis of the rotation of camera b that changes mainly disparities.
 Eigen::Vector3d disparity_axis(const EpipolarPose& given, std::span<const PlaneMatch> matches) {
   Eigen::Vector3d view = Eigen::Vector3d::Zero();
@@ -51,12 +57,11 @@ void advance(std::span<const PlaneMatch> matches, double scale, const Eigen::Vec
   Eigen::Matrix4d H = prior;
   Eigen::Vector4d g = prior * so_far;
   for (const PlaneMatch& m : matches) {
-    const Eigen::Vector3d normal = estimate.correction * m.normal, outward(m.b.x(), m.b.y(), 0);
-    const Eigen::Vector3d b = m.b - estimate.focal_error * outward;
+    const Eigen::Vector3d normal = estimate.correction * m.normal, b = refocused(m.b, estimate.focal_error);
     const double distance = b.dot(normal);
     const double ratio = distance / scale, weight = information / std::pow(1 + ratio * ratio, 2);
     Eigen::Vector4d J;
-    J << normal.cross(b), -outward.dot(normal);
+    J << normal.cross(b), -outward(m.b).dot(normal);
     H += weight * J * J.transpose();
     g += weight * distance * J;
   }
@@ -92,11 +97,6 @@ PairRotation solve(const EpipolarPose& given, std::span<const BearingPair> pairs
   return out;
 }
 
-// The bearing with the focal length of camera b that an estimate of its relative error gives.
-Eigen::Vector3d refocused(const Eigen::Vector3d& b, double focal_error) {
-  return (b - focal_error * Eigen::Vector3d(b.x(), b.y(), 0)).normalized();
-}
-
 // The rotation about the disparity axis, on the left of `correction`, that brings to infinity the matches that are on
 // their epipolar planes but behind the cameras, i.e. beyond parallel; 0 if they are so few that they may be wrong
 // matches, or so many that the cameras may be exchanged. The farthest angle is estimated from the tolerance, which
@@ -108,7 +108,7 @@ double rotation_to_front(const EpipolarPose& pose, std::span<const BearingPair> 
   std::size_t on_plane = 0;
   std::vector<double> behind;  // angles from the parallel of a to b, rad, negative behind the cameras
   for (const BearingPair& pair : pairs) {
-    const BearingPair match{pair.a, refocused(pair.b, focal_error)};
+    const BearingPair match{pair.a, refocused(pair.b, focal_error).normalized()};
     const Eigen::Vector3d parallel = pose.R_b_a * match.a;
     if (geometry::angle_between(parallel, match.b) >= tolerance && epipolar_angle(pose, match) >= tolerance) continue;
     const Eigen::Vector3d a = (parallel - axis.dot(parallel) * axis).stableNormalized();

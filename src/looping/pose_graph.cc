@@ -3,9 +3,9 @@
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "base/assert.h"
+#include "base/disjoint_sets.h"
 #include "matrix/block_matrix.h"
 
 namespace bslam::looping {
@@ -22,19 +22,12 @@ std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
 // Flags the constant vertices: the fixed ones, and the first vertex of every connected component without any.
 std::vector<std::uint8_t> held_vertices(const PoseGraphProblem& problem) {
-  std::vector<int> parent(problem.S_world.size());
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto root = [&](int v) {
-    while (parent[at(v)] != v) v = parent[at(v)] = parent[at(parent[at(v)])];
-    return v;
-  };
-  for (const Edge& edge : problem.edges) {
-    const int a = root(edge.a), b = root(edge.b);
-    parent[at(std::max(a, b))] = std::min(a, b);  // a root is the first vertex of its component
-  }
-  std::vector<std::uint8_t> held = problem.fixed, anchored(parent.size(), 0);
-  for (std::size_t v = 0; v < parent.size(); ++v) anchored[at(root(static_cast<int>(v)))] |= problem.fixed[v] != 0;
-  for (std::size_t v = 0; v < parent.size(); ++v) held[v] |= parent[v] == static_cast<int>(v) && anchored[v] == 0;
+  const std::size_t vertices = problem.S_world.size();
+  DisjointSets components(vertices);
+  for (const Edge& edge : problem.edges) components.join(at(edge.a), at(edge.b));
+  std::vector<std::uint8_t> held = problem.fixed, anchored(vertices, 0);
+  for (std::size_t v = 0; v < vertices; ++v) anchored[components.root(v)] |= problem.fixed[v] != 0;
+  for (std::size_t v = 0; v < vertices; ++v) held[v] |= components.root(v) == v && anchored[v] == 0;
   return held;
 }
 

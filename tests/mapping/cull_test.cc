@@ -12,9 +12,10 @@ class Cull : public ::testing::Test {
  protected:
   static constexpr std::size_t kKeypoints = 60, kMatched = 20;
   Cull() : map(map::synthetic_rig(2)) {}
-  KeyframeId add_keyframe() {
-    return map.add_keyframe(map::synthetic_frame(random, 2, kKeypoints, kMatched), map::random_pose(random, 0.5), {},
-                            map.newest_keyframe());
+  KeyframeId add_keyframe(bool camera_1 = true) {
+    auto frame = std::make_shared<frame::BundledFrame>(*map::synthetic_frame(random, 2, kKeypoints, kMatched));
+    if (!camera_1) frame->cameras[1].keypoints = {};
+    return map.add_keyframe(frame, map::random_pose(random, 0.5), {}, map.newest_keyframe());
   }
   LandmarkId add_landmark(const std::vector<map::Observation>& observations) {
     return map.add_landmark(map::random_point(random), observations);
@@ -27,6 +28,10 @@ class Cull : public ::testing::Test {
     return before - d.map().num_landmarks();
   }
   static FeatureId monocular(int i) { return FeatureId(static_cast<std::int32_t>(kMatched) + i); }
+  // The last feature of the newest keyframe.
+  FeatureId of_camera_1() const {
+    return FeatureId(static_cast<std::int32_t>(map.keyframe(map.newest_keyframe()).frame->bundled.size()) - 1);
+  }
 
   Random random{1, "cull"};
   map::BundledMap map;
@@ -74,13 +79,10 @@ TEST_F(Cull, KeepsLandmarksOlderThanTheProbation) {
 // Camera 1 has an image in every third keyframe only, as one with a lower rate.
 TEST_F(Cull, ProbationCountsKeyframesWithImagesOfTheCamera) {
   const KeyframeId k = add_keyframe();
-  const FeatureId last(static_cast<std::int32_t>(map.keyframe(k).frame->bundled.size()) - 1);
-  const LandmarkId of_0 = add_landmark({{k, monocular(0)}}), of_1 = add_landmark({{k, last}});
+  const LandmarkId of_0 = add_landmark({{k, monocular(0)}}), of_1 = add_landmark({{k, of_camera_1()}});
   ASSERT_EQ(map.landmark(of_1).reference.keypoint.camera, CameraIndex(1));
   for (int age = 1; age <= 9; ++age) {
-    auto frame = std::make_shared<frame::BundledFrame>(*map::synthetic_frame(random, 2, kKeypoints, kMatched));
-    if (age % 3 != 0) frame->cameras[1].keypoints = {};
-    map.add_keyframe(frame, map::random_pose(random, 0.5), {}, map.newest_keyframe());
+    add_keyframe(/*camera_1=*/age % 3 == 0);
     map::MapDraft d = draft();
     cull_landmarks(map.newest_keyframe(), options, d);
     EXPECT_EQ(d.map().alive(of_0), age != 3) << age;
@@ -92,12 +94,9 @@ TEST_F(Cull, ProbationCountsKeyframesWithImagesOfTheCamera) {
 // next.
 TEST_F(Cull, ProbationEndsAlthoughAKeyframeWasRemoved) {
   const KeyframeId k = add_keyframe();
-  const FeatureId last(static_cast<std::int32_t>(map.keyframe(k).frame->bundled.size()) - 1);
-  const LandmarkId of_1 = add_landmark({{k, last}});
+  const LandmarkId of_1 = add_landmark({{k, of_camera_1()}});
   for (int age = 1; age <= 4 * options.probation; ++age) {
-    auto frame = std::make_shared<frame::BundledFrame>(*map::synthetic_frame(random, 2, kKeypoints, kMatched));
-    if (age % 3 != 0) frame->cameras[1].keypoints = {};
-    map.add_keyframe(frame, map::random_pose(random, 0.5), {}, map.newest_keyframe());
+    add_keyframe(/*camera_1=*/age % 3 == 0);
     if (age == 9) map.remove_keyframe(KeyframeId(4));
     map::MapDraft d = draft();
     cull_landmarks(map.newest_keyframe(), options, d);
@@ -108,12 +107,9 @@ TEST_F(Cull, ProbationEndsAlthoughAKeyframeWasRemoved) {
 // A camera that has failed.
 TEST_F(Cull, ProbationEndsWithoutFurtherImages) {
   const KeyframeId k = add_keyframe();
-  const FeatureId last(static_cast<std::int32_t>(map.keyframe(k).frame->bundled.size()) - 1);
-  const LandmarkId of_1 = add_landmark({{k, last}});
+  const LandmarkId of_1 = add_landmark({{k, of_camera_1()}});
   for (int age = 1; age <= 4 * options.probation; ++age) {
-    auto frame = std::make_shared<frame::BundledFrame>(*map::synthetic_frame(random, 2, kKeypoints, kMatched));
-    frame->cameras[1].keypoints = {};
-    map.add_keyframe(frame, map::random_pose(random, 0.5), {}, map.newest_keyframe());
+    add_keyframe(/*camera_1=*/false);
     map::MapDraft d = draft();
     cull_landmarks(map.newest_keyframe(), options, d);
     EXPECT_EQ(d.map().alive(of_1), age < 4 * options.probation) << age;

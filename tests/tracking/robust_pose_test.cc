@@ -55,6 +55,12 @@ class RobustPose : public ::testing::Test {
     if (before && now) o.pixel += *now - *before;
   }
 
+  // Moves the point along its ray to a fifth of its distance.
+  void bring_near(solver::PoseObservation& o) const {
+    const geometry::SE3 T_cam_world = world.map.rig().cam_from_rig(o.camera) * truth;
+    o.point_world = T_cam_world.inverse() * (0.2 * (T_cam_world * o.point_world));
+  }
+
   double error(const solver::PoseSolution& solution) const {
     return (solution.T_rig_world.inverse().translation() - truth.inverse().translation()).norm();
   }
@@ -255,8 +261,7 @@ TEST_F(RobustPose, FollowsLandmarksThatSpreadInSpace) {
       const bool moves = m.landmark.value() % 2 == 0;
       if (!moves && at_rest++ % 2 == 0) continue;
       if (moves) {
-        const geometry::SE3 T_cam_world = world.map.rig().cam_from_rig(o.camera) * truth;
-        o.point_world = T_cam_world.inverse() * (0.2 * (T_cam_world * o.point_world));
+        bring_near(o);
         move({0.06, 0.02, -0.04}, o);
       }
       near.push_back(moves);
@@ -288,8 +293,7 @@ TEST_F(RobustPose, FollowsTheSceneBehindTwoMovingObjects) {
       if (!few_observations(m)) continue;
       const int part = m.landmark.value() % 12;
       if (part < 10) {
-        const geometry::SE3 T_cam_world = world.map.rig().cam_from_rig(o.camera) * truth;
-        o.point_world = T_cam_world.inverse() * (0.2 * (T_cam_world * o.point_world));
+        bring_near(o);
         move(of_people[part < 6 ? 0 : 1], o);
       }
       kept.push_back(o);
