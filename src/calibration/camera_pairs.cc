@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "camera/view_overlap.h"
 #include "frame/capture_times.h"
 
 namespace bslam::calibration {
@@ -72,10 +73,27 @@ Views spread_views(const map::BundledMap& map, std::span<const KeyframeId> keyfr
   return out;
 }
 
+// The parts of the images in which each camera observes features, by all keyframes.
+std::vector<camera::UsedView> used_views(const map::BundledMap& map, std::span<const KeyframeId> keyframes,
+                                         std::size_t first_camera, const camera::Rig& rig) {
+  std::vector<camera::UsedView> out;
+  for (std::size_t c = 0; c < rig.size(); ++c) {
+    camera::UsedView& view = out.emplace_back(rig.camera(c));
+    for (const KeyframeId k : keyframes) {
+      for (const Eigen::Vector2f& pixel : image_of(map, k, first_camera + c).keypoints.pixel)
+        view.add(pixel.cast<double>());
+    }
+  }
+  return out;
+}
+
 // The pair without evidence.
 CameraPair count_features(const map::BundledMap& map, std::span<const KeyframeId> keyframes, std::size_t first_camera,
-                          const camera::Rig& rig, std::size_t i, std::size_t j) {
-  const double of_i = rig.overlap_share(i, j), of_j = rig.overlap_share(j, i);
+                          const camera::Rig& rig, std::span<const camera::UsedView> used, std::size_t i,
+                          std::size_t j) {
+  const geometry::SE3 T_j_i = rig.cam_from_rig(j) * rig.rig_from_cam(i);
+  const double of_i = camera::overlap_share(rig.camera(i), used[i], rig.camera(j), used[j], T_j_i);
+  const double of_j = camera::overlap_share(rig.camera(j), used[j], rig.camera(i), used[i], T_j_i.inverse());
   const std::size_t a = first_camera + i, b = first_camera + j;
   CameraPair pair{
       .first = i, .second = j, .overlap = std::max(of_i, of_j), .keyframes = static_cast<int>(keyframes.size())};
@@ -124,12 +142,13 @@ std::vector<CameraPair> test_pairs(const map::BundledMap& map, std::span<const K
                                    std::size_t first_camera, const camera::Rig& given, const camera::Rig& final_rig,
                                    bool suspected) {
   std::vector<CameraPair> pairs;
+  const std::vector<camera::UsedView> used = used_views(map, keyframes, first_camera, given);
   std::vector<std::vector<KeyframeId>> common;
   std::vector<std::uint8_t> sound(given.size(), 0);  // cameras with a pair that was matched
   for (std::size_t i = 0; i < given.size(); ++i) {
     for (std::size_t j = i + 1; j < given.size(); ++j) {
       common.push_back(common_keyframes(map, keyframes, first_camera + i, first_camera + j));
-      pairs.push_back(count_features(map, common.back(), first_camera, given, i, j));
+      pairs.push_back(count_features(map, common.back(), first_camera, given, used, i, j));
       if (pairs.back().overlap >= kMuchOverlap && pairs.back().matched_share() >= kEnough) sound[i] = sound[j] = 1;
     }
   }

@@ -15,7 +15,9 @@ namespace bslam::calibration {
 // The features of a run that two of its cameras share.
 struct CameraPair {
   std::size_t first = 0, second = 0;  // cameras of the run
-  double overlap = 0;                 // largest fraction of the view of one of them that the other observes as well
+  // Largest fraction of the view of one of them that the other observes as well. Parts of the images without features
+  // in any keyframe, such as the corners of a fisheye's images, are not counted.
+  double overlap = 0;
   int keyframes = 0;  // number of keyframes in which both have an image of the same time with enough keypoints
   // Number of keypoints in these keyframes that are in the common part of the views, for the camera with fewer of them,
   // and how many of them were matched with a keypoint of the other camera.

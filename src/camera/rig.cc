@@ -1,7 +1,6 @@
 #include "camera/rig.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -9,6 +8,7 @@
 
 #include "base/assert.h"
 #include "camera/model_parameters.h"
+#include "camera/view_overlap.h"
 
 namespace bslam::camera {
 
@@ -52,29 +52,14 @@ Rig::Rig(std::vector<RigCamera> cameras, const SE3& T_cam0_rig) {
 }
 
 std::vector<double> Rig::measured_overlap(const std::vector<RigCamera>& cameras) const {
-  constexpr int kColumns = 24, kRows = 16;
-  constexpr std::array kDepths = {0.5, 2.0, 10.0, 100.0};  // metres
+  std::vector<UsedView> views;
+  for (const RigCamera& c : cameras) views.push_back(UsedView::all_of(c.camera));
   std::vector<double> overlap(size() * size(), 0.0);
   for (std::size_t i = 0; i < size(); ++i) {
-    std::vector<Vector3d> bearings;
-    for (int r = 0; r < kRows; ++r) {
-      for (int c = 0; c < kColumns; ++c) {
-        const Vector2d pixel((c + 0.5) * cameras[i].camera.width / kColumns - 0.5,
-                             (r + 0.5) * cameras[i].camera.height / kRows - 0.5);
-        if (const auto bearing = cameras[i].camera.unproject(pixel)) bearings.push_back(*bearing);
-      }
-    }
     for (std::size_t j = 0; j < size(); ++j) {
       if (i == j) continue;
-      const SE3 T_j_i = T_cam_rig_[j] * T_rig_cam_[i];
-      for (const double depth : kDepths) {
-        const auto seen = std::count_if(bearings.begin(), bearings.end(), [&](const Vector3d& b) {
-          const auto pixel = cameras[j].camera.project(T_j_i * (depth * b));
-          return pixel && cameras[j].camera.contains(*pixel);
-        });
-        double& share = overlap[i * size() + j];
-        share = std::max(share, static_cast<double>(seen) / (kColumns * kRows));
-      }
+      overlap[i * size() + j] = camera::overlap_share(cameras[i].camera, views[i], cameras[j].camera, views[j],
+                                                      T_cam_rig_[j] * T_rig_cam_[i]);
     }
   }
   return overlap;

@@ -129,6 +129,27 @@ TEST(CameraPairs, OfDarkOrSeparateViewsAreNotAccused) {
   EXPECT_FALSE(pairs[0].hardly_matched() || pairs[0].contradicted);
 }
 
+// Two cameras that look in directions 95 degrees apart. According to their calibrations, each observes directions up to
+// 165 degrees to the right as well, where the images of a real lens are black.
+TEST(CameraPairs, PartsOfImagesWithoutFeaturesDoNotOverlap) {
+  const geometry::SE3 ahead = synthetic::ring_rig(2).body_from_cam(0);
+  const auto pair_of = [&ahead](int width) {
+    std::vector<camera::RigCamera> cameras;
+    for (const double angle : {0.0, geometry::radians(95)}) {
+      const camera::KannalaBrandt lens({190, 190, 149.5, 149.5}, {0.003, 0.0007, -0.002, 0.0002});
+      const geometry::SE3 turned(geometry::so3_exp({0, angle, 0}), Eigen::Vector3d(angle > 0 ? 0.1 : 0.0, 0, 0));
+      cameras.push_back({camera::Camera{angle > 0 ? "right" : "front", lens, width, 300, 0, ""}, ahead * turned});
+    }
+    return camera::Rig(std::move(cameras));
+  };
+  const camera::Rig calibrated = pair_of(700);
+  ASSERT_GT(calibrated.overlap_share(0, 1), 0.4);
+  const auto pairs = tested(seen_by(pair_of(300), 0.8), calibrated, calibrated);
+  EXPECT_EQ(pairs[0].keyframes, 6);
+  EXPECT_LT(pairs[0].overlap, 0.2);
+  EXPECT_FALSE(pairs[0].hardly_matched());
+}
+
 // A camera that was knocked is a matter of the refinement.
 TEST(CameraPairs, AnotherArrangementIsNoSmallRotation) {
   PairEvidence evidence{.matches = 100, .agreeing = {5, 1, 1, 1, 1}, .other = OtherPose{90, 1.5, 10}};
