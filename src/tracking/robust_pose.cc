@@ -1,9 +1,7 @@
 #include "tracking/robust_pose.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <limits>
 #include <optional>
 
 #include "base/median.h"
@@ -42,22 +40,8 @@ constexpr double kContested = 0.5;
 // as many of the other in the same image, as a fraction of those of the rarer motion.
 constexpr double kInSameCameras = 0.5;
 
-constexpr double kNew = 0.5;           // support of a new landmark
-constexpr double kTrustedAfter = 1.0;  // s, of observation by keyframes
-
 bool few(const solver::PoseSolution& solution, double fraction, std::size_t matches) {
   return !solution.ok || solution.num_inliers < fraction * static_cast<double>(matches);
-}
-
-// Seconds between the first and the last keyframe that observe a landmark, at most kTrustedAfter.
-double time_observed(const map::BundledMap& map, LandmarkId landmark) {
-  TimeNs first = std::numeric_limits<TimeNs>::max(), last = std::numeric_limits<TimeNs>::lowest();
-  for (const map::Observation& o : map.observations(landmark)) {
-    const TimeNs time_ns = map.keyframe(o.keyframe).frame->time_ns;
-    first = std::min(first, time_ns);
-    last = std::max(last, time_ns);
-  }
-  return first >= last ? 0.0 : std::min(kTrustedAfter, to_seconds(last - first));
 }
 
 // The median distance of points from their median position.
@@ -79,7 +63,10 @@ class PoseChoice {
              std::span<const solver::PoseObservation> observations, const geometry::SE3& predicted,
              solver::PoseSolution first)
       : map_(input.map), matches_(matches), observations_(observations) {
-    if (newly_started(input, frame)) scene_.emplace(input, frame, observations, predicted);
+    if (newly_started(input, frame))
+      scene_.emplace(input, frame, observations, predicted);
+    else
+      confirmed_ = confirmed_landmarks(map_, input.state.visibility_counts, matches);
     const Support of_first = first.ok ? support_of(first) : Support();
     candidates_.push_back({std::move(first), of_first});
   }
@@ -99,6 +86,15 @@ class PoseChoice {
   }
 
   const solver::PoseSolution& best() const { return candidates_[best_].solution; }
+
+  // The observations of confirmed landmarks; none if the map is new.
+  std::vector<solver::PoseObservation> confirmed() const {
+    std::vector<solver::PoseObservation> out;
+    for (std::size_t i = 0; i < confirmed_.size(); ++i) {
+      if (confirmed_[i]) out.push_back(observations_[i]);
+    }
+    return out;
+  }
 
   ChosenPose chosen() && {
     ChosenPose out;
@@ -130,8 +126,8 @@ class PoseChoice {
   };
 
   Support support_of(const solver::PoseSolution& solution) const {
-    return {support(map_, matches_, observations_, solution.inlier),
-            scene_ ? kNew * scene_->agreeing_cells(solution.T_rig_world) : 0.0};
+    return {support(map_, matches_, observations_, solution.inlier, confirmed_),
+            scene_ ? kCellSupport * scene_->agreeing_cells(solution.T_rig_world) : 0.0};
   }
 
   Support weighted_support(const Candidate& other) const {
@@ -221,6 +217,7 @@ class PoseChoice {
   const FrameMatches& matches_;
   std::span<const solver::PoseObservation> observations_;
   std::optional<SceneMatches> scene_;
+  std::vector<std::uint8_t> confirmed_;  // per observation; empty if all are
   std::vector<Candidate> candidates_;
   std::size_t best_ = 0;  // index of a candidate
 };
@@ -241,56 +238,7 @@ bool newly_started(const TrackInput& input, const frame::BundledFrame& frame) {
   const map::BundledKeyframe& root = input.map.keyframe(input.map.root_of(input.state.anchored.reference));
   if (root.frame == nullptr) return false;
   const double age_s = to_seconds(frame.time_ns - root.frame->time_ns);
-  return age_s >= 0.0 && age_s < kTrustedAfter;
-}
-
-LandmarkSupport support(const map::BundledMap& map, const FrameMatches& matches,
-                        std::span<const solver::PoseObservation> observations, std::span<const std::uint8_t> inlier) {
-  constexpr double kNone = -1.0;
-  LandmarkSupport out;
-  std::size_t i = 0;
-  for (std::size_t c = 0; c < matches.size(); ++c) {
-    std::array<double, kCells * kCells> cells;  // longest time
-    cells.fill(kNone);
-    for (const Match& m : matches[c]) {
-      const std::size_t at = i++;
-      if (!inlier[at]) continue;
-      double& cell = cells[cell_of(observations[at].pixel, map.rig().camera(c))];
-      if (cell < kTrustedAfter) cell = std::max(cell, time_observed(map, m.landmark));
-    }
-    for (const double time : cells) {
-      if (time == kNone) continue;
-      out.spread += kNew;
-      out.lasting += time;
-    }
-  }
-  return out;
-}
-
-bool lasting_landmarks_found(const map::BundledMap& map, std::span<const LandmarkId> visible,
-                             const FrameMatches& matches, std::span<const std::uint8_t> inlier) {
-  constexpr double kLasting = 0.5;  // s
-  constexpr double kAboutAsOften = 1.0 / 3.0;
-  constexpr std::size_t kEnough = 50;  // landmarks
-  std::vector<LandmarkId> found;
-  std::size_t i = 0;
-  for (const auto& of_camera : matches) {
-    for (const Match& m : of_camera) {
-      if (inlier[i++]) found.push_back(m.landmark);
-    }
-  }
-  std::ranges::sort(found);
-  struct Counts {
-    std::size_t visible = 0, found = 0;
-    double share() const { return visible > 0 ? static_cast<double>(found) / static_cast<double>(visible) : 0.0; }
-  } lasting, new_ones;
-  for (const LandmarkId l : visible) {
-    Counts& counts = time_observed(map, l) >= kLasting ? lasting : new_ones;
-    ++counts.visible;
-    counts.found += std::ranges::binary_search(found, l);
-  }
-  if (std::min(lasting.visible, new_ones.visible) < kEnough) return true;
-  return lasting.share() >= kAboutAsOften * new_ones.share();
+  return age_s >= 0.0 && age_s < kLongObserved_s;
 }
 
 std::vector<std::uint8_t> agreeing_beyond_chance(const camera::Rig& rig,
@@ -328,6 +276,8 @@ ChosenPose robust_pose(const TrackInput& input, const frame::BundledFrame& frame
   PoseChoice choice(input, frame, matches, observations, predicted, std::move(first));
   if (of_outliers.ok) choice.consider(pose_near(of_outliers.T_rig_world));
   choice.consider(pose_near(predicted));
+  const auto of_confirmed = solver::solve_pose(rig, choice.confirmed(), predicted, motion, options);
+  if (of_confirmed.ok) choice.consider(pose_near(of_confirmed.T_rig_world));
   if (!few(choice.best(), kMinority, observations.size())) return std::move(choice).chosen();
   const solver::PoseSolution sampled =
       estimators::ransac_pose(frame::rig_of(rig, frame), observations, predicted, options, {},

@@ -5,28 +5,10 @@
 #include <vector>
 
 #include "solver/pose_solver.h"
+#include "tracking/landmark_support.h"
 #include "tracking/track.h"
 
 namespace bslam::tracking {
-
-// The support of a pose by landmarks: how widely its inliers are spread over the images and over time. Each image has a
-// grid of 8 x 8 cells. A cell with inliers counts 1/2 (`spread`) + min(1, t) (`lasting`), where t is the longest time
-// in seconds between the first and the last keyframe that observe the landmark of one of its inliers. A moving object
-// covers few cells, however many of its landmarks are found, and they soon become outliers. `observations` are those of
-// `matches`, in order.
-struct LandmarkSupport {
-  double spread = 0.0, lasting = 0.0;
-  double sum() const { return spread + lasting; }
-};
-LandmarkSupport support(const map::BundledMap& map, const FrameMatches& matches,
-                        std::span<const solver::PoseObservation> observations, std::span<const std::uint8_t> inlier);
-
-// Returns true if landmarks that keyframes have observed for a long time are found about as often as those observed for
-// a short time. `visible`: all landmarks that were searched for. Landmarks on a moving object have only been observed
-// for a short time. If mainly these are found, the pose is relative to a moving object. Returns true if too few of
-// either kind are visible to decide.
-bool lasting_landmarks_found(const map::BundledMap& map, std::span<const LandmarkId> visible,
-                             const FrameMatches& matches, std::span<const std::uint8_t> inlier);
 
 // Returns true if the map is so new that no landmark can have been observed for a long time.
 bool newly_started(const TrackInput& input, const frame::BundledFrame& frame);
@@ -48,9 +30,9 @@ struct ChosenPose {
 // As solver::solve_pose for the matches of a frame, in order; `predicted` is the initial pose. A robust kernel
 // converges to the majority of the matches, or between two motions that both have many matches. If a considerable part
 // of the matches are outliers, further poses are estimated: from the outliers, from the matches that agree with the
-// prediction, and by RANSAC if still most of them are outliers. Another pose replaces the first one if its support is
-// clearly larger, or if the first one could not be estimated. In a map that was just started, the agreement of all
-// keypoints adds to the support (tracking/scene_agreement.h).
+// prediction, from those of confirmed landmarks, and by RANSAC if still most of them are outliers. Another pose
+// replaces the first one if its support is clearly larger, or if the first one could not be estimated. In a map that
+// was just started, the agreement of all keypoints adds to the support (tracking/scene_agreement.h).
 ChosenPose robust_pose(const TrackInput& input, const frame::BundledFrame& frame, const FrameMatches& matches,
                        std::span<const solver::PoseObservation> observations, const geometry::SE3& predicted,
                        const solver::MotionModel& motion, const solver::PoseSolverOptions& options);

@@ -215,6 +215,36 @@ TEST_F(RobustPose, SupportIsTheSpreadOverImagesAndTime) {
   EXPECT_DOUBLE_EQ(support(world.map, matches, observations, inlier).sum(), most);
 }
 
+// New landmarks, which move, outnumber those that agreed with an earlier frame and are spread more widely.
+TEST_F(RobustPose, FollowsConfirmedLandmarks) {
+  std::vector<solver::PoseObservation> kept;
+  FrameMatches of_both(matches.size());
+  std::vector<std::uint8_t> moving, at_rest;
+  std::size_t i = 0;
+  for (std::size_t c = 0; c < matches.size(); ++c) {
+    for (const Match& m : matches[c]) {
+      solver::PoseObservation o = observations[i++];
+      const std::size_t times = world.map.observations(m.landmark).size();
+      if (times > 2 || (times == 1 && m.landmark.value() % 2 == 0)) continue;
+      if (times == 1) move({0.2, 0.05, -0.1}, o);
+      moving.push_back(times == 1);
+      at_rest.push_back(times == 2);
+      kept.push_back(o);
+      of_both[c].push_back(m);
+    }
+  }
+  matches = of_both;
+  observations = kept;
+  EXPECT_GT(std::ranges::count(moving, std::uint8_t{1}), 3 * std::ranges::count(at_rest, std::uint8_t{1}));
+  EXPECT_GT(support(world.map, matches, observations, moving).sum(),
+            1.1 * support(world.map, matches, observations, at_rest).sum());
+  const geometry::SE3 predicted = truth.perturbed((geometry::Vector6d() << 0, 1e-3, 0, 0.002, 0, 0.001).finished());
+  EXPECT_GT(error(solver::solve_pose(world.map.rig(), observations, predicted, motion, {})), 0.05);
+  const auto solution = pose(predicted);
+  ASSERT_TRUE(solution.ok);
+  EXPECT_LT(error(solution), 0.03);
+}
+
 // Landmarks on a small part of an image outnumber all others, and have been observed as long.
 TEST_F(RobustPose, FollowsLandmarksThatSpreadOverTheImages) {
   const camera::Camera& camera = world.map.rig().camera(std::size_t{0});
@@ -331,58 +361,6 @@ TEST_F(RobustPose, FewRightMatchesConfirmAPoseAndWrongOnesDoNot) {
   EXPECT_TRUE(confirmed());
   for (std::size_t i = 0; i < observations.size(); i += 4) mislead(i);
   EXPECT_FALSE(confirmed());
-}
-
-// Landmarks of the scene by the time for which keyframes observed them.
-class LastingLandmarks : public ::testing::Test {
- protected:
-  LastingLandmarks() {
-    ThreadPool pool(2);
-    MatchSearch search =
-        find_landmarks(world.map, seen.frame, truth, world.map.landmark_ids(), {}, {.radius = 0.02}, pool);
-    visible = std::move(search.visible);
-    matches = std::move(search.found);
-  }
-
-  bool is_lasting(const Match& m) const { return is_lasting(m.landmark); }
-  bool is_lasting(LandmarkId l) const {
-    const auto of = world.map.observations(l);
-    const auto time_ns = [&](const map::Observation& o) { return world.map.keyframe(o.keyframe).frame->time_ns; };
-    return to_seconds(time_ns(of.back()) - time_ns(of.front())) >= 0.5;
-  }
-
-  std::vector<std::uint8_t> inliers(const std::function<bool(const Match&)>& is_inlier) const {
-    std::vector<std::uint8_t> out;
-    for (const auto& camera : matches) {
-      for (const Match& m : camera) out.push_back(is_inlier(m));
-    }
-    return out;
-  }
-
-  map::SimulatedMap world = true_map(simulator(synthetic::default_rig()), 1.0, 0.25);
-  synthetic::SimulatedFrame seen = world.sim.frame(FrameId(1), 0.1);
-  geometry::SE3 truth = seen.T_world_rig.inverse();
-  std::vector<LandmarkId> visible;
-  FrameMatches matches;
-};
-
-TEST_F(LastingLandmarks, AreFoundLikeOthersWhereNothingMoves) {
-  EXPECT_TRUE(lasting_landmarks_found(world.map, visible, matches, inliers([](const Match&) { return true; })));
-  int k = 0;  // of noise, few of both are found
-  EXPECT_TRUE(
-      lasting_landmarks_found(world.map, visible, matches, inliers([&](const Match&) { return k++ % 8 == 0; })));
-}
-
-TEST_F(LastingLandmarks, AreMissedWhereThePoseIsThatOfMovingObjects) {
-  int k = 0;
-  const auto moving = inliers([&](const Match& m) { return !is_lasting(m) || k++ % 100 == 0; });
-  EXPECT_FALSE(lasting_landmarks_found(world.map, visible, matches, moving));
-}
-
-TEST_F(LastingLandmarks, TellNothingIfFewAreVisible) {
-  std::erase_if(visible, [&](LandmarkId l) { return is_lasting(l) && l.value() % 128 != 0; });
-  EXPECT_TRUE(
-      lasting_landmarks_found(world.map, visible, matches, inliers([&](const Match& m) { return !is_lasting(m); })));
 }
 
 }  // namespace
