@@ -32,6 +32,7 @@ constexpr double kWider = 2.0, kMaxWider = 3.0;
 // fewer the two are variations of one motion.
 constexpr std::size_t kMinOfMotion = 20;
 constexpr double kFractionOfInliers = 1.0 / 3;
+constexpr double kHardlyAny = 0.05;              // fraction of the landmarks of a motion that are confirmed
 constexpr double kFractionOfOutliers = 1.0 / 3;  // minimum fraction of the outliers of one motion that is another one
 
 // Minimum ratio of the support of another motion to that of the chosen one at which the choice is contested.
@@ -164,15 +165,28 @@ class PoseChoice {
 
   // The factor by which the support of another pose counts more or less than that of the best one: the ratio of the
   // extents in space of the landmarks that agree with only one of the two. Landmarks that agree with both are far away.
+  // If those of one motion only are nearly all unconfirmed, this decides, and not the extent.
   double relative_extent(const solver::PoseSolution& other) const {
     const std::vector<Eigen::Vector3d> of_other = exclusive(other, best()), of_best = exclusive(best(), other);
     if (!are_two_motions(of_other.size(), other, of_best.size())) return 1.0;
+    if (is_unconfirmed(other, best()) != is_unconfirmed(best(), other)) return 1.0;
     const double ratio = extent(of_other) / extent(of_best);
     if (!(ratio >= kWider || ratio <= 1.0 / kWider)) return 1.0;  // also if both extents are zero
     // Outliers that are no motion agree with another pose by chance, and are spread widely.
     const auto outliers = static_cast<double>(outliers_but_for_third_motions(other));
     if (ratio > 1.0 && static_cast<double>(of_other.size()) < kFractionOfOutliers * outliers) return 1.0;
     return std::clamp(ratio, 1.0 / kMaxWider, kMaxWider);
+  }
+
+  // Whether hardly any landmark that agrees with a pose but not with another is confirmed.
+  bool is_unconfirmed(const solver::PoseSolution& with, const solver::PoseSolution& without) const {
+    std::size_t all = 0, confirmed = 0;
+    for (std::size_t i = 0; i < confirmed_.size(); ++i) {
+      if (!with.inlier[i] || without.inlier[i]) continue;
+      ++all;
+      confirmed += confirmed_[i];
+    }
+    return static_cast<double>(confirmed) < kHardlyAny * static_cast<double>(all);
   }
 
   // The number of outliers of the best pose, without those that show a motion which is neither this one nor the other.
