@@ -25,7 +25,7 @@ double time_observed(const map::BundledMap& map, LandmarkId landmark) {
 
 }  // namespace
 
-std::vector<std::uint8_t> confirmed_landmarks(const map::BundledMap& map, std::span<const map::VisibilityCount> recent,
+std::vector<std::uint8_t> confirmed_landmarks(const map::BundledMap& map, const TrackerState& state,
                                               const FrameMatches& matches) {
   constexpr std::uint32_t kMinFound = 2, kOneIn = 3;  // frames
   std::vector<std::uint8_t> out;
@@ -33,8 +33,9 @@ std::vector<std::uint8_t> confirmed_landmarks(const map::BundledMap& map, std::s
     for (const Match& m : of_camera) {
       const map::Landmark& landmark = map.landmark(m.landmark);
       std::uint32_t expected = landmark.expected, found = landmark.found;
-      const auto counts = std::ranges::lower_bound(recent, m.landmark, {}, &map::VisibilityCount::landmark);
-      if (counts != recent.end() && counts->landmark == m.landmark) {
+      for (const auto* recent : {&state.visibility_counts, &state.pending_counts}) {
+        const auto counts = std::ranges::lower_bound(*recent, m.landmark, {}, &map::VisibilityCount::landmark);
+        if (counts == recent->end() || counts->landmark != m.landmark) continue;
         expected += counts->expected;
         found += counts->found;
       }

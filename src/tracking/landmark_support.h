@@ -9,6 +9,7 @@
 #include "map/map_edit.h"
 #include "solver/pose_solver.h"
 #include "tracking/frame_matches.h"
+#include "tracking/track.h"
 
 namespace bslam::tracking {
 
@@ -17,8 +18,8 @@ inline constexpr double kLongObserved_s = 1.0;  // landmarks observed by keyfram
 
 // Per match: whether the landmark has agreed with other frames than the keyframe that created it: a later keyframe
 // observes it, or it was found in at least two frames and in a third of those in which it was expected. A landmark on a
-// moving object is not confirmed as long as the poses are right. `recent`: counts that are not yet in the map, sorted.
-std::vector<std::uint8_t> confirmed_landmarks(const map::BundledMap& map, std::span<const map::VisibilityCount> recent,
+// moving object is not confirmed as long as the poses are right. The counts of the state are not yet in the map.
+std::vector<std::uint8_t> confirmed_landmarks(const map::BundledMap& map, const TrackerState& state,
                                               const FrameMatches& matches);
 
 // The support of a pose by landmarks: how widely its inliers are spread over the images and over time. Each image has a

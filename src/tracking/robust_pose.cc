@@ -67,7 +67,7 @@ class PoseChoice {
     if (newly_started(input, frame))
       scene_.emplace(input, frame, observations, predicted);
     else
-      confirmed_ = confirmed_landmarks(map_, input.state.visibility_counts, matches);
+      confirmed_ = confirmed_landmarks(map_, input.state, matches);
     const Support of_first = first.ok ? support_of(first) : Support();
     candidates_.push_back({std::move(first), of_first});
   }

@@ -101,6 +101,8 @@ struct TrackerState {
   DirectState direct;
   // Not yet added to the map; one for each landmark, sorted.
   std::vector<map::VisibilityCount> visibility_counts;
+  // Those that a keyframe which is not yet in the map will add.
+  std::vector<map::VisibilityCount> pending_counts;
 };
 
 // Per camera: whether it is excluded because it contradicted the other cameras or lost its landmarks.

@@ -54,7 +54,8 @@ void Tracker::want_keyframe(const map::BundledMap& map, TrackOutcome& outcome) c
   if (state.pending) return;
   outcome.keyframe_wanted = true;
   state.pending = {outcome.record.result.frame, state.track.anchored, map.keyframe_slots(), 0};
-  state.track.visibility_counts.clear();  // the keyframe adds them; they are lost if its features give no pose
+  // The keyframe adds them; they are lost if its features give no pose.
+  state.track.pending_counts = std::exchange(state.track.visibility_counts, {});
 }
 
 std::optional<TrackOutcome> Tracker::create_keyframe(KeyframeRequest request, std::span<const image::Pyramid> pyramids,
@@ -81,9 +82,12 @@ std::optional<CreatedKeyframe> Tracker::adopt_keyframe(const map::BundledMap& ma
   const KeyframeId keyframe = keyframe_of(map, *state.pending);
   if (!keyframe.valid()) {
     state.keyframe_failed = ++state.pending->frames > kMaxPendingFrames;
-    if (state.keyframe_failed) state.pending.reset();
+    if (!state.keyframe_failed) return std::nullopt;
+    state.pending.reset();
+    state.track.pending_counts.clear();
     return std::nullopt;
   }
+  state.track.pending_counts.clear();
   const PendingKeyframe pending = *std::exchange(state.pending, std::nullopt);
   TrackerState& track = state.track;
   apply_scale_change(map, track);

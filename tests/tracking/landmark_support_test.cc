@@ -49,13 +49,18 @@ TEST_F(LastingLandmarks, AndThoseFoundInSeveralFramesAreConfirmed) {
   const auto by_keyframes = inliers([&](const Match& m) { return observations(m) > 1; });
   EXPECT_GT(std::ranges::count(by_keyframes, std::uint8_t{1}), 20);
   EXPECT_GT(std::ranges::count(by_keyframes, std::uint8_t{0}), 20);
-  EXPECT_EQ(confirmed_landmarks(world.map, {}, matches), by_keyframes);
-  std::vector<map::VisibilityCount> recent;
+  EXPECT_EQ(confirmed_landmarks(world.map, TrackerState(), matches), by_keyframes);
+  TrackerState state;
+  std::vector<map::VisibilityCount>& recent = state.visibility_counts;
   for (const LandmarkId l : world.map.landmark_ids()) recent.push_back({l, 6, l.value() % 2 == 0 ? 2u : 1u});
-  EXPECT_EQ(confirmed_landmarks(world.map, recent, matches),
+  EXPECT_EQ(confirmed_landmarks(world.map, state, matches),
             inliers([&](const Match& m) { return observations(m) > 1 || m.landmark.value() % 2 == 0; }));
   for (map::VisibilityCount& counts : recent) counts.expected = 7;
-  EXPECT_EQ(confirmed_landmarks(world.map, recent, matches), by_keyframes);
+  EXPECT_EQ(confirmed_landmarks(world.map, state, matches), by_keyframes);
+  for (map::VisibilityCount& counts : recent) counts.expected = counts.found = 1;
+  EXPECT_EQ(confirmed_landmarks(world.map, state, matches), by_keyframes);
+  state.pending_counts = recent;
+  EXPECT_EQ(confirmed_landmarks(world.map, state, matches), inliers([](const Match&) { return true; }));
 }
 
 TEST_F(LastingLandmarks, CountMoreInCellsWithConfirmedOnes) {
