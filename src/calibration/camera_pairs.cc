@@ -74,26 +74,27 @@ Views spread_views(const map::BundledMap& map, std::span<const KeyframeId> keyfr
 }
 
 // The parts of the images in which each camera observes features, by all keyframes.
-std::vector<camera::UsedView> used_views(const map::BundledMap& map, std::span<const KeyframeId> keyframes,
-                                         std::size_t first_camera, const camera::Rig& rig) {
-  std::vector<camera::UsedView> out;
+std::vector<camera::SampledView> used_views(const map::BundledMap& map, std::span<const KeyframeId> keyframes,
+                                            std::size_t first_camera, const camera::Rig& rig) {
+  std::vector<camera::SampledView> out;
   for (std::size_t c = 0; c < rig.size(); ++c) {
-    camera::UsedView& view = out.emplace_back(rig.camera(c));
+    camera::UsedView used(rig.camera(c));
     for (const KeyframeId k : keyframes) {
       for (const Eigen::Vector2f& pixel : image_of(map, k, first_camera + c).keypoints.pixel)
-        view.add(pixel.cast<double>());
+        used.add(pixel.cast<double>());
     }
+    out.emplace_back(rig.camera(c), used);
   }
   return out;
 }
 
 // The pair without evidence.
 CameraPair count_features(const map::BundledMap& map, std::span<const KeyframeId> keyframes, std::size_t first_camera,
-                          const camera::Rig& rig, std::span<const camera::UsedView> used, std::size_t i,
+                          const camera::Rig& rig, std::span<const camera::SampledView> views, std::size_t i,
                           std::size_t j) {
   const geometry::SE3 T_j_i = rig.cam_from_rig(j) * rig.rig_from_cam(i);
-  const double of_i = camera::overlap_share(rig.camera(i), used[i], rig.camera(j), used[j], T_j_i);
-  const double of_j = camera::overlap_share(rig.camera(j), used[j], rig.camera(i), used[i], T_j_i.inverse());
+  const double of_i = camera::overlap_share(views[i], views[j], T_j_i);
+  const double of_j = camera::overlap_share(views[j], views[i], T_j_i.inverse());
   const std::size_t a = first_camera + i, b = first_camera + j;
   CameraPair pair{
       .first = i, .second = j, .overlap = std::max(of_i, of_j), .keyframes = static_cast<int>(keyframes.size())};
@@ -142,7 +143,7 @@ std::vector<CameraPair> test_pairs(const map::BundledMap& map, std::span<const K
                                    std::size_t first_camera, const camera::Rig& given, const camera::Rig& final_rig,
                                    bool suspected) {
   std::vector<CameraPair> pairs;
-  const std::vector<camera::UsedView> used = used_views(map, keyframes, first_camera, given);
+  const std::vector<camera::SampledView> used = used_views(map, keyframes, first_camera, given);
   std::vector<std::vector<KeyframeId>> common;
   std::vector<std::uint8_t> sound(given.size(), 0);  // cameras with a pair that was matched
   for (std::size_t i = 0; i < given.size(); ++i) {

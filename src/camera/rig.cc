@@ -52,14 +52,13 @@ Rig::Rig(std::vector<RigCamera> cameras, const SE3& T_cam0_rig) {
 }
 
 std::vector<double> Rig::measured_overlap(const std::vector<RigCamera>& cameras) const {
-  std::vector<UsedView> views;
-  for (const RigCamera& c : cameras) views.push_back(UsedView::all_of(c.camera));
+  std::vector<SampledView> views;
+  for (const RigCamera& c : cameras) views.emplace_back(c.camera, UsedView::all_of(c.camera));
   std::vector<double> overlap(size() * size(), 0.0);
   for (std::size_t i = 0; i < size(); ++i) {
     for (std::size_t j = 0; j < size(); ++j) {
       if (i == j) continue;
-      overlap[i * size() + j] = camera::overlap_share(cameras[i].camera, views[i], cameras[j].camera, views[j],
-                                                      T_cam_rig_[j] * T_rig_cam_[i]);
+      overlap[i * size() + j] = camera::overlap_share(views[i], views[j], T_cam_rig_[j] * T_rig_cam_[i]);
     }
   }
   return overlap;

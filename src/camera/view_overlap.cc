@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <vector>
 
 namespace bslam::camera {
 namespace {
@@ -13,17 +12,6 @@ constexpr std::array kDistances = {0.5, 2.0, 10.0, 100.0};  // metres
 std::size_t cell_of(double coordinate, double size, std::size_t cells) {
   const double cell = (coordinate + 0.5) / size * static_cast<double>(cells);
   return static_cast<std::size_t>(std::clamp(cell, 0.0, static_cast<double>(cells - 1)));
-}
-
-std::vector<Vector3d> bearings_of(const Camera& camera, const UsedView& used) {
-  std::vector<Vector3d> bearings;
-  for (std::size_t row = 0; row < UsedView::kRows; ++row) {
-    for (std::size_t column = 0; column < UsedView::kColumns; ++column) {
-      if (!used.contains(column, row)) continue;
-      if (const auto bearing = camera.unproject(used.centre(column, row))) bearings.push_back(*bearing);
-    }
-  }
-  return bearings;
 }
 
 }  // namespace
@@ -51,17 +39,24 @@ Vector2d UsedView::centre(std::size_t column, std::size_t row) const {
           (static_cast<double>(row) + 0.5) * height_ / static_cast<double>(kRows) - 0.5};
 }
 
-double overlap_share(const Camera& a, const UsedView& used_by_a, const Camera& b, const UsedView& used_by_b,
-                     const geometry::SE3& T_b_a) {
-  if (used_by_a.size() == 0) return 0.0;
-  const std::vector<Vector3d> bearings = bearings_of(a, used_by_a);
+SampledView::SampledView(const Camera& of, const UsedView& used_by_it) : camera(&of), used(used_by_it) {
+  for (std::size_t row = 0; row < UsedView::kRows; ++row) {
+    for (std::size_t column = 0; column < UsedView::kColumns; ++column) {
+      if (!used.contains(column, row)) continue;
+      if (const auto bearing = camera->unproject(used.centre(column, row))) bearings.push_back(*bearing);
+    }
+  }
+}
+
+double overlap_share(const SampledView& a, const SampledView& b, const geometry::SE3& T_b_a) {
+  if (a.used.size() == 0) return 0.0;
   double share = 0.0;
   for (const double distance : kDistances) {
-    const auto seen = std::ranges::count_if(bearings, [&](const Vector3d& bearing) {
-      const auto pixel = b.project(T_b_a * (distance * bearing));
-      return pixel && b.contains(*pixel) && used_by_b.contains(*pixel);
+    const auto seen = std::ranges::count_if(a.bearings, [&](const Vector3d& bearing) {
+      const auto pixel = b.camera->project(T_b_a * (distance * bearing));
+      return pixel && b.camera->contains(*pixel) && b.used.contains(*pixel);
     });
-    share = std::max(share, static_cast<double>(seen) / static_cast<double>(used_by_a.size()));
+    share = std::max(share, static_cast<double>(seen) / static_cast<double>(a.used.size()));
   }
   return share;
 }

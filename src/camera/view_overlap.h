@@ -3,6 +3,7 @@
 
 #include <bitset>
 #include <cstddef>
+#include <vector>
 
 #include "camera/camera.h"
 #include "geometry/se3.h"
@@ -37,9 +38,18 @@ class UsedView {
   std::bitset<kColumns * kRows> used_;
 };
 
+// The used view of a camera with the directions of its cells: unit vectors in the camera frame, of cells that have a
+// ray.
+struct SampledView {
+  SampledView(const Camera& camera, const UsedView& used);
+
+  const Camera* camera;
+  UsedView used;
+  std::vector<Vector3d> bearings;
+};
+
 // Fraction of the used view of camera a that is in the used view of camera b, in [0, 1]; the maximum over several
 // distances. 0 if a uses nothing.
-double overlap_share(const Camera& a, const UsedView& used_by_a, const Camera& b, const UsedView& used_by_b,
-                     const geometry::SE3& T_b_a);
+double overlap_share(const SampledView& a, const SampledView& b, const geometry::SE3& T_b_a);
 
 }  // namespace bslam::camera

@@ -13,7 +13,7 @@
 
 namespace bslam::tracking {
 
-inline constexpr double kCellSupport = 0.5;
+inline constexpr double kCellSupport = 0.5;     // support of a cell of an image, see LandmarkSupport
 inline constexpr double kLongObserved_s = 1.0;  // landmarks observed by keyframes for longer are trusted
 
 // Per match: whether the landmark has agreed with other frames than the keyframe that created it: a later keyframe

@@ -7,7 +7,6 @@
 #include "base/median.h"
 #include "estimators/pose_ransac.h"
 #include "frame/rig_at.h"
-#include "tracking/image_cells.h"
 #include "tracking/scene_agreement.h"
 
 namespace bslam::tracking {

@@ -298,7 +298,7 @@ void Tracker::track(Input& input, TrackOutcome& outcome) {
     state.track.visibility_counts.clear();
   } else if (output.keyframe_due ||
              (input.direct.failure == DirectFailure::kKeyframeDue && !output.at_similar_keyframe)) {
-    state.pending.reset();
+    state.forget_pending();
     propose_keyframe(input, output, outcome);
   }
   outcome.observed = observed_keypoints(output.frame, std::move(output.matched), std::move(output.matches));
@@ -338,7 +338,7 @@ void Tracker::handle_lost(Input& input, const TrackerState& before, TrackOutcome
   const bool recent = to_seconds(result.time_ns - before.time_ns) <= kMaxPrediction_s;
   if (result.reason != LostReason::kNoImages || !recent) {
     state.track.status = TrackStatus::kLost;
-    state.pending.reset();
+    state.forget_pending();
   }
   update_odometry(*input.map, before, outcome);
   if (!had_features(result)) return;
@@ -371,7 +371,7 @@ bool Tracker::relocalise(Input& input, TrackOutcome& outcome) {
   state = state_at_keyframe({}, input.frame.time_ns, *input.map, place->matched_keyframe, std::move(landmarks));
   state.cameras = std::move(cameras);
   state.anchored = map::AnchoredPose::at(*input.map, place->matched_keyframe, place->T_rig_world);
-  outcome.next.pending.reset();
+  outcome.next.forget_pending();
   outcome.record.relocalisation = Relocalisation{place->matched_keyframe, place->inliers};
   return true;
 }

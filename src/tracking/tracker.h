@@ -95,6 +95,8 @@ struct FrontEndState {
   TimeNs lost_since_ns = 0;                 // time of the first of them
   geometry::SE3 T_rig_odom, T_map_odom;
 
+  // The pending keyframe is in the map, or it is not waited for any more.
+  void forget_pending();
   // The state for the initialisation of another map; the odometry pose is continued.
   FrontEndState restarted() const;
 };

@@ -24,6 +24,11 @@ KeyframeId keyframe_of(const map::BundledMap& map, const PendingKeyframe& pendin
 
 }  // namespace
 
+void FrontEndState::forget_pending() {
+  pending.reset();
+  track.pending_counts.clear();
+}
+
 void Tracker::propose_keyframe(Input& input, const TrackOutput& output, TrackOutcome& outcome) const {
   const Stopwatch watch;
   map::MapDraft draft(input.map);
@@ -82,13 +87,11 @@ std::optional<CreatedKeyframe> Tracker::adopt_keyframe(const map::BundledMap& ma
   const KeyframeId keyframe = keyframe_of(map, *state.pending);
   if (!keyframe.valid()) {
     state.keyframe_failed = ++state.pending->frames > kMaxPendingFrames;
-    if (!state.keyframe_failed) return std::nullopt;
-    state.pending.reset();
-    state.track.pending_counts.clear();
+    if (state.keyframe_failed) state.forget_pending();
     return std::nullopt;
   }
-  state.track.pending_counts.clear();
-  const PendingKeyframe pending = *std::exchange(state.pending, std::nullopt);
+  const PendingKeyframe pending = *state.pending;
+  state.forget_pending();
   TrackerState& track = state.track;
   apply_scale_change(map, track);
   const auto T_rig_world = track.anchored.resolve(map), T_then_world = pending.pose.resolve(map);

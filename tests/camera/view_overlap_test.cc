@@ -36,11 +36,13 @@ TEST(ViewOverlap, IsLimitedToUsedParts) {
     for (std::size_t column = 0; column + 1 < UsedView::kColumns / 2; ++column) left.add(left.centre(column, row));
   }
   ASSERT_EQ(left.size(), kCells / 2);
-  const geometry::SE3 same;
-  EXPECT_DOUBLE_EQ(overlap_share(camera, all, camera, all, same), 1.0);
-  EXPECT_DOUBLE_EQ(overlap_share(camera, all, camera, left, same), 0.5);
-  EXPECT_DOUBLE_EQ(overlap_share(camera, left, camera, all, same), 1.0);
-  EXPECT_EQ(overlap_share(camera, UsedView(camera), camera, all, same), 0.0);
+  const auto share = [&](const UsedView& of, const UsedView& in) {
+    return overlap_share(SampledView(camera, of), SampledView(camera, in), geometry::SE3());
+  };
+  EXPECT_DOUBLE_EQ(share(all, all), 1.0);
+  EXPECT_DOUBLE_EQ(share(all, left), 0.5);
+  EXPECT_DOUBLE_EQ(share(left, all), 1.0);
+  EXPECT_EQ(share(UsedView(camera), all), 0.0);
 }
 
 }  // namespace
