@@ -166,6 +166,7 @@ void shrink(const Image& in, const Resampling& plan, Image& out) {
 
 void build_pyramid(const ImageView& base, int levels, double factor, Pyramid& pyramid) {
   BSLAM_ASSERT(factor > 1.0 && factor <= 2.0, "the ratio of pyramid levels must be in (1, 2]");
+  pyramid.factor = factor;
   pyramid.scale_x.clear();
   pyramid.scale_y.clear();
   double scale = 1.0;

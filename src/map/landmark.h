@@ -33,7 +33,8 @@ struct Landmark {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  // metres, map
   // mean unit vector from the observing cameras to the landmark, map frame
   Eigen::Vector3d view_direction = Eigen::Vector3d::Zero();
-  // Metres. Distances at which the landmark can be matched within one pyramid level of its reference level.
+  // Metres. Distances at which a camera of the resolution of its reference camera sees it on the coarsest level and on
+  // level 0.
   float min_distance = 0, max_distance = 0;
   feature::Descriptor descriptor{};     // the medoid of its observations' descriptors
   std::uint64_t descriptor_source = 0;  // hash of the observations of which `descriptor` is the medoid; 0: unknown

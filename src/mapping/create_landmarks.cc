@@ -14,8 +14,8 @@ using Eigen::Vector3d;
 using frame::KeypointRef;
 using geometry::SE3;
 
-// Maximum ratio of the size change predicted from the distances of two views to the size change between their pyramid
-// levels.
+// Maximum ratio of the size change predicted from the distances and resolutions of two views to the size change between
+// their pyramid levels.
 constexpr double kMaxScaleRatio = 2.0;
 // Whether two cameras have a common view is tested with every kProbeStep-th keypoint.
 constexpr std::size_t kProbeStep = 16;
@@ -75,13 +75,15 @@ void append(const map::BundledMap& map, KeyframeId k, FeatureId f, std::vector<m
   }
 }
 
-// Tests whether the ratio of the distances agrees with the ratio of the pyramid levels.
+// Tests whether the ratio of the widths of a pixel at the point agrees with the ratio of the pyramid levels.
 bool sizes_agree(const Vector3d& point, View a, KeypointIndex ka, View b, KeypointIndex kb, const map::BundledMap& map,
                  const feature::PyramidShape& pyramid) {
-  const double da = (cam_from_world(map, a) * point).norm(), db = (cam_from_world(map, b) * point).norm();
+  const auto pixel_m = [&](View v) {
+    return (cam_from_world(map, v) * point).norm() * map.rig().camera(v.camera).radians_per_pixel();
+  };
   const int levels =
       map.keypoints(a.keyframe, a.camera).level[ka.index()] - map.keypoints(b.keyframe, b.camera).level[kb.index()];
-  const double ratio = da / db * pyramid.scale(levels);
+  const double ratio = pixel_m(a) / pixel_m(b) * pyramid.scale(levels);
   return ratio < kMaxScaleRatio && ratio > 1.0 / kMaxScaleRatio;
 }
 
@@ -121,7 +123,8 @@ void create_between(View a, View b, double depth, const CreationOptions& options
                                          .sigmas = 2.0,
                                          .max_hamming = options.max_hamming,
                                          .ratio = options.ratio,
-                                         .max_level_difference = 3};
+                                         .max_level_difference = 3,
+                                         .scale_factor = features.pyramid.scale_factor};
   for (const matching::EpipolarMatch& m : matching::match_epipolar(view_a, view_b, search)) {
     const FeatureId fa = draft.map().keyframe(a.keyframe).frame->bundled.feature(a.camera, m.a);
     const FeatureId fb = draft.map().keyframe(b.keyframe).frame->bundled.feature(b.camera, m.b);

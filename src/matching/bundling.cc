@@ -84,7 +84,8 @@ std::vector<Edge> match_pair(const camera::Rig& rig, std::span<const frame::Came
                                .sigmas = options.sigmas,
                                .max_hamming = options.max_hamming,
                                .ratio = options.ratio,
-                               .max_level_difference = 2};
+                               .max_level_difference = 2,
+                               .scale_factor = pyramids[pair.a.index()].factor};
   std::vector<Edge> edges;
   for (const EpipolarMatch& m : match_epipolar(a, b, search)) {
     Edge edge{{pair.a, m.a}, {pair.b, m.b}, m.hamming, {}, {}};

@@ -16,11 +16,18 @@ constexpr double kMaxWindow = 0.25;  // rad around the baseline; wider windows o
 constexpr double kSamePlace = 4.0;   // standard deviations; closer keypoints are the same corner on two levels
 
 // A bearing relative to the baseline: angle around it, angle to it (at this camera) with its sine and cosine, angular
-// standard deviation.
+// standard deviation; level of its keypoint in the pyramid of the second camera.
 struct Polar {
   double about = 0, from = 0, sine = 0, cosine = 0, sigma = 0;
+  int level = 0;
   std::uint32_t keypoint = 0;
 };
+
+// Number of levels by which the images of camera b are finer than those of camera a.
+int levels_finer(const camera::Camera& a, const camera::Camera& b, double scale_factor) {
+  return static_cast<int>(
+      std::lround(std::log(a.radians_per_pixel() / b.radians_per_pixel()) / std::log(scale_factor)));
+}
 
 // Standard deviation of a difference.
 double both(double sigma_a, double sigma_b) { return std::sqrt(sigma_a * sigma_a + sigma_b * sigma_b); }
@@ -50,7 +57,8 @@ class AngularDeviation {
   std::vector<double> of_level_;  // empty: each keypoint has its own
 };
 
-std::vector<Polar> to_polar(const EpipolarView& view, const BaselineFrame& frame) {
+// `finer`: number of levels by which the images of the second camera are finer.
+std::vector<Polar> to_polar(const EpipolarView& view, const BaselineFrame& frame, int finer) {
   std::vector<Polar> out;
   out.reserve(view.keypoints->size());
   const AngularDeviation sigma(view);
@@ -60,7 +68,8 @@ std::vector<Polar> to_polar(const EpipolarView& view, const BaselineFrame& frame
     const Vector3d d =
         view.T_common_cam.rotation() * view.shutter.bearing_at_middle(view.keypoints->bearing[k], pixel_y);
     const double u = d.dot(frame.x), v = d.dot(frame.y), sine = std::sqrt(u * u + v * v), cosine = d.dot(frame.e);
-    out.push_back({std::atan2(v, u), std::atan2(sine, cosine), sine, cosine, sigma(k), static_cast<std::uint32_t>(k)});
+    out.push_back({std::atan2(v, u), std::atan2(sine, cosine), sine, cosine, sigma(k), view.keypoints->level[k] + finer,
+                   static_cast<std::uint32_t>(k)});
   }
   return out;
 }
@@ -78,7 +87,7 @@ struct SortedView {
 };
 
 SortedView sorted_view(const EpipolarView& view, const BaselineFrame& frame) {
-  SortedView out{to_polar(view, frame), 0};
+  SortedView out{to_polar(view, frame, 0), 0};
   for (std::size_t i = 0, n = out.polar.size(); i < n; ++i) {
     out.max_sigma = std::max(out.max_sigma, out.polar[i].sigma);
     for (const double turn : {-2 * std::numbers::pi, 2 * std::numbers::pi}) {
@@ -107,7 +116,6 @@ std::optional<Best> best_match(const Polar& p, const EpipolarView& a, const Epip
   const double nearest = angle_at_second(p, options.min_depth_m, baseline);
   const double farthest = angle_at_second(p, options.max_depth_m, baseline);
   const feature::Descriptor& descriptor = a.keypoints->descriptor[p.keypoint];
-  const int level = a.keypoints->level[p.keypoint];
   candidates.clear();
   int best = options.max_hamming + 1;
   const Polar* found = nullptr;
@@ -117,7 +125,7 @@ std::optional<Best> best_match(const Polar& p, const EpipolarView& a, const Epip
     const double slack = options.sigmas * both(p.sigma, it->sigma);
     if (std::abs(it->about - p.about) * p.sine > slack) continue;
     if (it->from < farthest - slack || it->from > nearest + slack) continue;
-    if (std::abs(b.keypoints->level[it->keypoint] - level) > options.max_level_difference) continue;
+    if (std::abs(it->level - p.level) > options.max_level_difference) continue;
     candidates.push_back(&*it);
     const int distance = feature::hamming(descriptor, b.keypoints->descriptor[it->keypoint]);
     if (distance < best) {
@@ -147,7 +155,8 @@ std::vector<EpipolarMatch> match_epipolar(const EpipolarView& a, const EpipolarV
   constexpr int kNone = 1 << 20;
   std::vector<std::pair<int, std::uint32_t>> owner(b.keypoints->size(), {kNone, 0});  // (hamming, position in matches)
   std::vector<const Polar*> candidates;
-  for (const Polar& p : to_polar(a, frame)) {
+  const int finer = levels_finer(*a.camera, *b.camera, options.scale_factor);
+  for (const Polar& p : to_polar(a, frame, finer)) {
     const auto best = best_match(p, a, b, sorted, length, options, candidates);
     if (!best) continue;
     auto& [distance, position] = owner[best->keypoint];

@@ -27,12 +27,13 @@ struct EpipolarView {
 };
 
 struct EpipolarOptions {
-  double min_depth_m = 0.2;  // minimum distance of a point from the first camera, metres
-  double max_depth_m = 1e9;  // maximum distance, metres
-  double sigmas = 3.0;       // maximum distance from the epipolar plane, in standard deviations of both keypoints
-  int max_hamming = 60;      // maximum descriptor distance, of 256 bits
-  double ratio = 0.85;       // maximum ratio of best to second best descriptor distance elsewhere on the curve
-  int max_level_difference = 2;
+  double min_depth_m = 0.2;      // minimum distance of a point from the first camera, metres
+  double max_depth_m = 1e9;      // maximum distance, metres
+  double sigmas = 3.0;           // maximum distance from the epipolar plane, in standard deviations of both keypoints
+  int max_hamming = 60;          // maximum descriptor distance, of 256 bits
+  double ratio = 0.85;           // maximum ratio of best to second best descriptor distance elsewhere on the curve
+  int max_level_difference = 2;  // between the level of a keypoint and that on which the other camera sees its size
+  double scale_factor = 1.2;     // scale factor of the pyramid
 };
 
 struct EpipolarMatch {

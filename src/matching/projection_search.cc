@@ -21,9 +21,9 @@ struct Candidate {
   std::uint32_t keypoint = 0;
 };
 
-// The range of distances of a point is extended by 20 %, because levels overlap.
+// The range of sizes of a point is extended by 20 %, because levels overlap.
 struct RangeExtension {
-  double farther = 1.2, nearer = 0.8;
+  double larger = 1.2, smaller = 0.8;
 
   // By less than one and a half levels, so that the levels searched include one of the image.
   static RangeExtension of_levels(double scale_factor) {
@@ -32,19 +32,19 @@ struct RangeExtension {
   }
 };
 
-bool in_range(const SearchPoint& p, double distance, const RangeExtension& extension) {
-  return p.max_distance <= 0 ||
-         (distance > extension.nearer * p.min_distance && distance < extension.farther * p.max_distance);
+// `pixel_m`: width of a level-0 pixel at the point.
+bool in_range(const SearchPoint& p, double pixel_m, const RangeExtension& extension) {
+  return p.max_pixel <= 0 || (pixel_m > extension.smaller * p.min_pixel && pixel_m < extension.larger * p.max_pixel);
 }
 
-// Level on which the point is predicted at this distance.
-double predicted_level(const SearchPoint& p, double distance, double log_factor) {
-  return p.max_distance > 0 ? std::log(p.max_distance / distance) / log_factor : 0.0;
+// Level on which the point is predicted.
+double predicted_level(const SearchPoint& p, double pixel_m, double log_factor) {
+  return p.max_pixel > 0 ? std::log(p.max_pixel / pixel_m) / log_factor : 0.0;
 }
 
 struct Projection {
   Vector2d pixel;
-  double distance;  // metres
+  double pixel_m;  // width of a level-0 pixel at the point
 };
 
 // An image into which points are projected.
@@ -60,19 +60,20 @@ class View {
         axis_(R_.row(2).transpose()),
         min_cosine_(std::cos(max_view_angle)),
         min_axis_cosine_(rig.min_axis_cosine(c)),
+        radians_per_pixel_(camera_.radians_per_pixel()),
         range_(range) {}
 
-  // Projection of a point. Returns nullopt if it is outside the image, its distances, or its cone of viewing
+  // Projection of a point. Returns nullopt if it is outside the image, its range of sizes, or its cone of viewing
   // directions.
   std::optional<Projection> project(const SearchPoint& p) const {
     const Vector3d ray = p.position - centre_;
-    const double distance = ray.norm();
-    if (!in_range(p, distance, range_) || ray.dot(axis_) < min_axis_cosine_ * distance) return std::nullopt;
+    const double distance = ray.norm(), pixel_m = distance * radians_per_pixel_;
+    if (!in_range(p, pixel_m, range_) || ray.dot(axis_) < min_axis_cosine_ * distance) return std::nullopt;
     const bool outside_cone = ray.dot(p.view_direction) < min_cosine_ * distance;
     if (outside_cone && p.view_direction != Vector3d::Zero()) return std::nullopt;
     const auto pixel = camera::project(camera_, shutter_, R_ * p.position + t_);
     if (!pixel || !camera_.contains(*pixel)) return std::nullopt;
-    return Projection{*pixel, distance};
+    return Projection{*pixel, pixel_m};
   }
 
  private:
@@ -82,6 +83,7 @@ class View {
   Vector3d t_, centre_, axis_;  // metres; centre and optical axis in the common frame
   // Minimum cosines of the angle between viewing directions and of the angle to the optical axis.
   double min_cosine_, min_axis_cosine_;
+  double radians_per_pixel_;
   RangeExtension range_;
 };
 
@@ -126,7 +128,7 @@ ProjectionSearchResult search_by_projection(const camera::Rig& rig, CameraIndex 
     const auto projected = view.project(p);
     if (!projected) continue;
     result.visible.push_back(static_cast<std::uint32_t>(i));
-    const double level = predicted_level(p, projected->distance, log_factor);
+    const double level = predicted_level(p, projected->pixel_m, log_factor);
     const int centre = static_cast<int>(std::lround(level));
     near.clear();
     frame.grid.near(keypoints, projected->pixel, radius_px * std::pow(options.scale_factor, std::max(0.0, level)),
@@ -179,7 +181,8 @@ std::vector<VisiblePoint> visible_points(const camera::Rig& rig, CameraIndex c, 
   std::vector<VisiblePoint> out;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const auto projected = view.project(points[i]);
-    if (projected) out.push_back({static_cast<std::uint32_t>(i), projected->pixel, projected->distance});
+    if (projected)
+      out.push_back({static_cast<std::uint32_t>(i), projected->pixel, points[i].max_pixel / projected->pixel_m});
   }
   return out;
 }

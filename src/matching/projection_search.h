@@ -14,12 +14,13 @@
 
 namespace bslam::matching {
 
-// A point to search for.
+// A point to search for. Its size is known from the image it was detected in, as the width at the point of a pixel of
+// the level there. An image of any angular resolution shows it on the level whose pixels have this width.
 struct SearchPoint {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();        // metres, common frame
   Eigen::Vector3d view_direction = Eigen::Vector3d::Zero();  // mean unit vector to it, common frame; zero: unknown
-  float min_distance = 0;                                    // metres, distance at which it is on the coarsest level
-  float max_distance = 0;                                    // metres, distance at which it is on level 0
+  float min_pixel = 0;  // metres, width of a level-0 pixel at the point if it is on the coarsest level
+  float max_pixel = 0;  // metres, the same if it is on level 0; not positive: unknown
   const feature::Descriptor* descriptor = nullptr;
 };
 
@@ -70,7 +71,7 @@ std::vector<geometry::SE3> camera_poses(const camera::Rig& rig, const geometry::
 struct VisiblePoint {
   std::uint32_t point = 0;
   Eigen::Vector2d pixel;  // level-0 pixels
-  double distance = 0;    // metres
+  double scale = 0;       // size in the image relative to a feature of level 0; 0: unknown
 };
 
 // The points predicted visible in a camera, in order; see ProjectionSearchResult::visible. `max_view_angle`: radians.

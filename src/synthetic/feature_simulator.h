@@ -48,7 +48,7 @@ struct FeatureSimulatorOptions {
 struct SimulatedLandmark {
   Vector3d position;     // metres, world
   Vector3d tangent;      // unit vector, world: defines the orientation of keypoints
-  double base_distance;  // metres
+  double base_distance;  // metres, distance at which camera 0 sees it on level 0
   feature::Descriptor descriptor;
   feature::Patch patch;  // identical from all viewpoints
 };

@@ -27,8 +27,7 @@ void add_visible(const TrackInput& input, const frame::BundledFrame& frame, cons
     const SE3 T_cam_world = rig.cam_from_rig(c) * T_rig_world;
     for (const auto& v : matching::visible_points(rig, CameraIndex(c), T_cam_world, points, max_view_angle)) {
       if (!skip.empty() && skip[v.point]) continue;
-      out[c].push_back({landmarks[v.point], v.pixel, points[v.point].max_distance / v.distance,
-                        static_cast<std::uint32_t>(first + v.point)});
+      out[c].push_back({landmarks[v.point], v.pixel, v.scale, static_cast<std::uint32_t>(first + v.point)});
     }
   });
 }

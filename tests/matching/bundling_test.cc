@@ -130,6 +130,37 @@ TEST_F(Bundle, KeypointsOfMatchedFeaturesShowTheSamePoint) {
   EXPECT_LT(normalised[normalised.size() * 95 / 100], 2.5);  // depth errors in standard deviations
 }
 
+// A camera with a multiple of the pixels on the same field of view shows every feature on a coarser level.
+TEST(BundleOfResolutions, CamerasOfDifferentResolutionsAreMatched) {
+  const Wall wall;
+  const auto matched = [&](double factor) {
+    const auto camera = [](double f, const char* name) {
+      return camera::Camera{name,
+                            camera::Pinhole({260 * f, 260 * f, 160 * f - 0.5, 120 * f - 0.5}),
+                            static_cast<int>(320 * f),
+                            static_cast<int>(240 * f),
+                            0,
+                            ""};
+    };
+    const camera::Rig rig({{camera(1, "a"), {}}, {camera(factor, "b"), SE3({}, Vector3d(0.15, 0.01, 0))}});
+    ThreadPool pool(1);
+    feature::FeatureOptions features;
+    features.per_image = 1000;
+    FrameBuilder builder(rig.size(), features, {});
+    image::ImageBundle images;
+    for (std::size_t c = 0; c < rig.size(); ++c)
+      images.images.push_back({image::ImageState::kPresent, 0, render(wall, rig.camera(c), rig.rig_from_cam(c))});
+    const frame::BundledFrame extracted = builder.extract(rig, images, pool);
+    const std::vector<AlignmentOptions> alignment(rig.size());
+    return bundle(rig, extracted, builder.pyramids(), {}, alignment, pool).bundled.num_matched();
+  };
+  const std::size_t equal = matched(1);
+  std::printf("%zu %zu %zu\n", equal, matched(1.6), matched(2.2));
+  EXPECT_GT(equal, 200u);
+  EXPECT_GT(matched(1.6), equal / 2);
+  EXPECT_GT(matched(2.2), equal / 2);
+}
+
 TEST_F(Bundle, SatisfiesTheInvariantsOfTheTable) {
   const frame::BundledFrame frame = make();
   EXPECT_EQ(frame.bundled.size(), frame.bundled.num_matched() + frame.bundled.num_monocular());

@@ -26,10 +26,9 @@ class SearchByProjection : public ::testing::Test {
       const Vector3d in_camera = distance * *camera.unproject(pixel);
       const auto level = static_cast<int>(random.below(6));
       descriptors.push_back({random.next(), random.next(), random.next(), random.next()});
-      const double max_distance = distance * std::pow(1.2, level);
+      const double max_pixel = distance * std::pow(1.2, level) * camera.radians_per_pixel();
       points.push_back({T_cam_common.inverse() * in_camera, T_cam_common.rotation().inverse() * in_camera.normalized(),
-                        static_cast<float>(max_distance / std::pow(1.2, 7)), static_cast<float>(max_distance),
-                        nullptr});
+                        static_cast<float>(max_pixel / std::pow(1.2, 7)), static_cast<float>(max_pixel), nullptr});
       const Eigen::Vector2d off = pixel + 2 * Eigen::Vector2d(random.normal(), random.normal());
       feature::Descriptor seen = descriptors.back();
       for (int b = 0; b < 15; ++b) seen[random.below(4)] ^= std::uint64_t{1} << random.below(64);
@@ -104,6 +103,22 @@ TEST_F(SearchByProjection, SearchesOnlyAroundThePredictedLevel) {
   EXPECT_GT(search({.level_slack = 2}).matches.size(), kPoints * 9 / 10);
 }
 
+// A camera with 1.2^3 times the pixels on the same field of view shows every point three levels higher.
+TEST_F(SearchByProjection, ImagesOfAHigherResolutionShowPointsOnCoarserLevels) {
+  const std::size_t before = search().matches.size();
+  const double factor = std::pow(1.2, 3);
+  camera = {"finer", camera::Pinhole({400 * factor, 400 * factor, 319.5 * factor, 239.5 * factor}), 1106, 830, 0, ""};
+  std::vector<std::uint8_t> levels = frame.keypoints.level.copy();
+  std::vector<Eigen::Vector2f> pixels = frame.keypoints.pixel.copy();
+  for (std::uint8_t& l : levels) l = static_cast<std::uint8_t>(l + 3);
+  for (Eigen::Vector2f& p : pixels) p *= static_cast<float>(factor);
+  frame.keypoints.level = std::move(levels);
+  frame.keypoints.pixel = std::move(pixels);
+  frame.grid = frame::FeatureGrid(frame.keypoints, camera.width, camera.height);
+  EXPECT_EQ(search().visible.size(), kPoints);
+  EXPECT_GE(search({.level_slack = 0}).matches.size(), before);
+}
+
 TEST_F(SearchByProjection, SearchesOnlyWithinTheViewingAngle) {
   for (std::size_t i = 0; i < kPoints; ++i) {
     Vector3d& direction = points[i].view_direction;
@@ -117,20 +132,21 @@ TEST_F(SearchByProjection, SearchesOnlyWithinTheViewingAngle) {
 }
 
 TEST_F(SearchByProjection, SearchesOnlyWithinTheDistanceRange) {
-  for (std::size_t i = 0; i < 50; ++i) points[i].max_distance *= 0.3f;     // too far
-  for (std::size_t i = 50; i < 100; ++i) points[i].min_distance *= 10.0f;  // too near
+  for (std::size_t i = 0; i < 50; ++i) points[i].max_pixel *= 0.3f;     // too far
+  for (std::size_t i = 50; i < 100; ++i) points[i].min_pixel *= 10.0f;  // too near
   for (const std::uint32_t i : search().visible) EXPECT_GE(i, 50u);
   std::size_t near = 0;
-  for (const std::uint32_t i : search().visible) near += i >= 50 && i < 100 && points[i].min_distance > 10;
+  for (const std::uint32_t i : search().visible)
+    near += i >= 50 && i < 100 && points[i].min_pixel > 10 * camera.radians_per_pixel();
   EXPECT_EQ(near, 0u);
 }
 
 // Levels that differ by 5 % in scale: 15 % beyond the range are three levels beyond the image.
 TEST_F(SearchByProjection, LeavesOutPointsThatAreOnNoLevelOfTheImage) {
   for (SearchPoint& p : points) {
-    const double distance = (p.position - T_cam_common.inverse().translation()).norm();
-    p.max_distance = static_cast<float>(distance / 1.15);
-    p.min_distance = static_cast<float>(distance / 1.5);
+    const double pixel_m = (p.position - T_cam_common.inverse().translation()).norm() * camera.radians_per_pixel();
+    p.max_pixel = static_cast<float>(pixel_m / 1.15);
+    p.min_pixel = static_cast<float>(pixel_m / 1.5);
   }
   EXPECT_EQ(search().visible.size(), kPoints);
   ProjectionSearchOptions options;
