@@ -23,7 +23,8 @@ enum class Mode {
   kParallel     // in separate threads; each result is used as soon as it is available: for live use, the default
 };
 // In the last two modes a frame does not wait for the first tests of the calibration against the images, as it does in
-// bslam run. Set execution.await_calibration for recordings with a calibration that may be wrong.
+// bslam run. Set execution.await_calibration for recordings with a calibration that may be wrong, and
+// execution.await_mapping_s for recordings that are passed faster than they were captured in parallel mode.
 
 // Description of one setting.
 struct Setting {

@@ -26,6 +26,7 @@ execution::Mode internal(Mode mode) {
 
 Config::Config() : impl_(std::make_unique<Impl>()) {
   impl_->config.execution.await_calibration = false;  // for live use
+  impl_->config.execution.await_mapping_s = 0.0;
 }
 Config::Config(const Config& other) : impl_(std::make_unique<Impl>(*other.impl_)) {}
 Config& Config::operator=(const Config& other) {

@@ -39,7 +39,7 @@ class LaggedExecutor : public StageExecutor {
   }
   ~LaggedExecutor() override { interrupt(); }
 
-  map::MapSnapshot begin_frame(FrameId frame) override {
+  map::MapSnapshot begin_frame(FrameId frame, TimeNs) override {
     rethrow();
     ++now_;
     while (finish_due()) {

@@ -22,6 +22,10 @@ struct ExecutionOptions {
   // Frames wait for the first calibrations and the mapping before them (execution::awaited), if the calibration is to
   // be estimated. Not in sequential mode, which always waits, and not where frames come in real time.
   bool await_calibration = true;
+  // Parallel mode: a frame waits for keyframes that were requested longer before it, and for their mapping; 0: it does
+  // not wait. The mapping of a recording that is processed faster than it was captured is thus no later, in recorded
+  // time, than that of live cameras. Frames that come in real time do not wait.
+  double await_mapping_s = 0.15;
   // Lagged mode: a stage's result is used this number of frames after the frame at which the stage started. It should
   // be slightly longer than the stage takes, to avoid waiting; lag_global is for maps of some hundred keyframes.
   int lag_keyframe = 1, lag_map = 3, lag_loop = 5, lag_calibrate = 40, lag_global = 40;
@@ -42,6 +46,11 @@ struct ExecutionOptions {
         "await_calibration", self.await_calibration, Range{}, "",
         "at the start, frames wait until the images have been compared with the calibration; ignored by bslam live and "
         "with --late drop; false by default in the C++ and Python interfaces");
+    visitor(
+        "await_mapping_s", self.await_mapping_s, Range{0, 1000}, "s",
+        "parallel mode: frames wait for the mapping of keyframes that were requested longer before, in recorded time; "
+        "0: they do not wait; ignored by bslam live and with --late drop; 0 by default in the C++ and Python "
+        "interfaces");
     visitor("lag_keyframe", self.lag_keyframe, Range{1, 10}, "frames",
             "lagged mode: delay from the request of a keyframe to its use");
     visitor("lag_map", self.lag_map, Range{1, 10000}, "frames",

@@ -21,10 +21,11 @@ class ParallelExecutor : public StageExecutor {
   }
   ~ParallelExecutor() override { interrupt(); }
 
-  map::MapSnapshot begin_frame(FrameId frame) override {
+  map::MapSnapshot begin_frame(FrameId frame, TimeNs time_ns) override {
     {
       std::unique_lock lock(mutex_);
-      changed_.wait(lock, [this] { return closed_ || !awaits_any(); });
+      frame_ns_ = time_ns;
+      changed_.wait(lock, [this] { return closed_ || (!awaits_any() && !mapping_is_late()); });
     }
     rethrow();
     return gate_.begin_frame(frame);
@@ -40,7 +41,7 @@ class ParallelExecutor : public StageExecutor {
   void enqueue(const StageTask& task) override {
     {
       std::unique_lock lock(mutex_);
-      push(task, lock);
+      push({task, frame_ns_}, lock);
     }
     rethrow();
   }
@@ -69,14 +70,24 @@ class ParallelExecutor : public StageExecutor {
   }
 
  private:
-  struct StageQueue {
-    std::deque<StageTask> waiting;
-    // Stop source of the running task, until the task that follows it is enqueued.
-    std::optional<std::stop_source> running;
-    StageTask running_task;  // if one is running
-    bool restart = false;    // the running task was stopped and must be run again
+  struct TimedTask {
+    StageTask task;
+    TimeNs frame_ns = 0;  // time of the frame that caused it
   };
 
+  struct StageQueue {
+    std::deque<TimedTask> waiting;
+    // Stop source of the running task, until the task that follows it is enqueued.
+    std::optional<std::stop_source> running;
+    TimedTask running_task;  // if one is running
+    bool restart = false;    // the running task was stopped and must be run again
+
+    bool any_of(const auto& predicate) const {
+      return (running && predicate(running_task)) || std::ranges::any_of(waiting, predicate);
+    }
+  };
+
+  const StageQueue& queue(Stage stage) const { return queues_[static_cast<std::size_t>(stage)]; }
   StageQueue& queue(Stage stage) { return queues_[static_cast<std::size_t>(stage)]; }
 
   void rethrow() const {
@@ -97,9 +108,14 @@ class ParallelExecutor : public StageExecutor {
     if (!setup_.options.await_calibration || !setup_.functions[Stage::kCalibrate]) return false;
     const map::MapSnapshot newest = gate_.newest();
     return std::ranges::any_of(queues_, [&](const StageQueue& q) {
-      return (q.running && awaited(q.running_task, *newest)) ||
-             std::ranges::any_of(q.waiting, [&](const StageTask& task) { return awaited(task, *newest); });
+      return q.any_of([&](const TimedTask& t) { return awaited(t.task, *newest); });
     });
+  }
+
+  bool mapping_is_late() const {
+    const double limit_s = setup_.options.await_mapping_s;
+    const auto late = [&](const TimedTask& t) { return to_seconds(frame_ns_ - t.frame_ns) > limit_s; };
+    return limit_s > 0.0 && (queue(Stage::kKeyframe).any_of(late) || queue(Stage::kMap).any_of(late));
   }
 
   static void drop(StageQueue& q) {
@@ -121,12 +137,12 @@ class ParallelExecutor : public StageExecutor {
     changed_.notify_all();
   }
 
-  void push(const StageTask& task, std::unique_lock<std::mutex>& lock) {
-    StageQueue& q = queue(task.stage);
+  void push(const TimedTask& timed, std::unique_lock<std::mutex>& lock) {
+    StageQueue& q = queue(timed.task.stage);
     const auto room = static_cast<std::size_t>(setup_.options.max_pending_keyframes);
     changed_.wait(lock, [&] { return closed_ || q.waiting.size() < room; });
     if (closed_) return;
-    q.waiting.push_back(task);
+    q.waiting.push_back(timed);
     changed_.notify_all();
   }
 
@@ -144,38 +160,38 @@ class ParallelExecutor : public StageExecutor {
 
   void run_tasks(Stage stage) {
     std::stop_token stop;
-    while (std::optional<StageTask> task = take(stage, stop)) {
+    while (std::optional<TimedTask> timed = take(stage, stop)) {
       for (bool done = false; !done;) {
         CommitOutcome outcome = CommitOutcome::kStopped;
         std::exception_ptr failure;
         try {
-          outcome = run(*task, stop);
+          outcome = run(timed->task, stop);
         } catch (...) {
           failure = std::current_exception();
         }
-        done = finish(*task, outcome, failure, stop);
+        done = finish(*timed, outcome, failure, stop);
       }
     }
   }
 
   // Returns the next task of a stage and its stop token, or nullopt if closed.
-  std::optional<StageTask> take(Stage stage, std::stop_token& stop) {
+  std::optional<TimedTask> take(Stage stage, std::stop_token& stop) {
     StageQueue& q = queue(stage);
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return closed_ || !q.waiting.empty(); });
     if (closed_) return std::nullopt;
-    const StageTask task = q.waiting.front();
+    const TimedTask timed = q.waiting.front();
     q.waiting.pop_front();
     stop = q.running.emplace().get_token();
-    q.running_task = task;
+    q.running_task = timed;
     changed_.notify_all();  // the queue has space
-    return task;
+    return timed;
   }
 
   // Ends a run of a task. If the task must be run again, returns false and replaces its stop token.
-  bool finish(const StageTask& task, CommitOutcome outcome, const std::exception_ptr& failure, std::stop_token& stop) {
+  bool finish(const TimedTask& timed, CommitOutcome outcome, const std::exception_ptr& failure, std::stop_token& stop) {
     std::unique_lock lock(mutex_);
-    StageQueue& q = queue(task.stage);
+    StageQueue& q = queue(timed.task.stage);
     if (q.restart && outcome == CommitOutcome::kStopped) {
       q.restart = false;
       stop = q.running.emplace().get_token();
@@ -186,7 +202,8 @@ class ParallelExecutor : public StageExecutor {
       close();
     }
     if (outcome == CommitOutcome::kCommitted) {
-      for (const StageTask& next : following(task, *gate_.newest(), setup_.functions)) push(next, lock);
+      for (const StageTask& next : following(timed.task, *gate_.newest(), setup_.functions))
+        push({next, timed.frame_ns}, lock);
     }
     q.running.reset();
     q.restart = false;
@@ -229,7 +246,8 @@ class ParallelExecutor : public StageExecutor {
   const ExecutionSetup setup_;
   mutable std::mutex mutex_;
   std::condition_variable changed_;
-  std::array<StageQueue, kStages.size()> queues_;  // this and the next two members are guarded by mutex_
+  std::array<StageQueue, kStages.size()> queues_;  // this and the next three members are guarded by mutex_
+  TimeNs frame_ns_ = 0;                            // time of the newest frame
   bool closed_ = false;
   std::exception_ptr failure_;
   std::array<std::jthread, kStages.size()> workers_;  // last member, so that the threads are joined first

@@ -16,7 +16,7 @@ class ReplayExecutor : public StageExecutor {
     keep(gate_.newest());
   }
 
-  map::MapSnapshot begin_frame(FrameId frame) override {
+  map::MapSnapshot begin_frame(FrameId frame, TimeNs) override {
     run_background();
     if (interrupted()) return gate_.begin_frame(frame);
     expect(JournalStep::kFrame, frame.value());

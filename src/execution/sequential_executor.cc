@@ -9,7 +9,7 @@ class SequentialExecutor : public StageExecutor {
  public:
   SequentialExecutor(MapGate& gate, ExecutionSetup setup) : gate_(gate), setup_(std::move(setup)) {}
 
-  map::MapSnapshot begin_frame(FrameId frame) override { return gate_.begin_frame(frame); }
+  map::MapSnapshot begin_frame(FrameId frame, TimeNs) override { return gate_.begin_frame(frame); }
   map::CommitReport commit(JournalStep step, map::MapDraft draft) override {
     return gate_.commit(step, std::move(draft));
   }

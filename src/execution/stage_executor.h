@@ -20,8 +20,8 @@ class StageExecutor {
  public:
   virtual ~StageExecutor() = default;
 
-  // Returns the version of the map that the frame uses. Must be called once per frame, in order.
-  virtual map::MapSnapshot begin_frame(FrameId frame) = 0;
+  // Returns the version of the map that the frame of this time uses. Must be called once per frame, in order.
+  virtual map::MapSnapshot begin_frame(FrameId frame, TimeNs time_ns) = 0;
 
   // Commits an edit of the caller's thread.
   virtual map::CommitReport commit(JournalStep step, map::MapDraft draft) = 0;

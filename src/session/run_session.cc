@@ -218,7 +218,10 @@ Result<Fed> run_to_end(const dataset::Dataset& dataset, const SessionOptions& op
 system::Config config_for(const SessionOptions& options) {
   system::Config config = options.config;
   const bool in_real_time = options.pace == Pace::kRealtime && options.late == Late::kDrop;
-  if (options.source || in_real_time) config.execution.await_calibration = false;
+  if (options.source || in_real_time) {
+    config.execution.await_calibration = false;
+    config.execution.await_mapping_s = 0.0;
+  }
   return config;
 }
 

@@ -25,7 +25,7 @@ class FixedMap final : public execution::StageExecutor {
  public:
   explicit FixedMap(map::MapSnapshot map) : map_(std::move(map)) {}
 
-  map::MapSnapshot begin_frame(FrameId) override { return map_; }
+  map::MapSnapshot begin_frame(FrameId, TimeNs) override { return map_; }
   map::CommitReport commit(execution::JournalStep, map::MapDraft) override {
     throw std::logic_error("localisation does not change the map");
   }

@@ -82,7 +82,7 @@ tracking::TrackOutcome Pipeline::track(const image::ImageBundle& images, const t
   };
   bool directly = tracker_.tracks_directly(state_);
   if (!directly) add_features();
-  outcome.seen = executor.begin_frame(frame.id);
+  outcome.seen = executor.begin_frame(frame.id, frame.time_ns);
   // It was planned at the scale of the state.
   frame.twist = geometry::scaled(frame.twist, state_.track.anchored.scale_change(*outcome.seen));
   const bool recalibrated = preparation_.adopt_rig(*outcome.seen, frame);

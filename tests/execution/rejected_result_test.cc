@@ -28,10 +28,10 @@ StageFunctions scaling_stage(std::latch& corrected) {
 // The caller commits another correction, by a factor of 3, while kMap runs.
 Journal run(StageExecutor& executor, MapGate& gate, std::latch& corrected) {
   const StageWorld world;
-  executor.enqueue(world.add_keyframe(FrameId(0), executor.begin_frame(FrameId(0)), executor));
-  executor.commit(JournalStep::kTrack, scaled(executor.begin_frame(FrameId(1)), 3.0));
+  executor.enqueue(world.add_keyframe(FrameId(0), executor.begin_frame(FrameId(0), 0), executor));
+  executor.commit(JournalStep::kTrack, scaled(executor.begin_frame(FrameId(1), 0), 3.0));
   corrected.count_down();
-  for (int i = 2; i < 20; ++i) executor.begin_frame(FrameId(i));
+  for (int i = 2; i < 20; ++i) executor.begin_frame(FrameId(i), 0);
   executor.drain();
   executor.end();
   EXPECT_DOUBLE_EQ(gate.newest()->keyframe(KeyframeId(0)).scale, 6.0);

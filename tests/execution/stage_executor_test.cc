@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <optional>
+#include <semaphore>
 #include <thread>
 
 #include "execution/stage_world.h"
@@ -52,7 +53,7 @@ struct WorldRun {
   std::vector<std::uint64_t> seen = {};  // hash of the version used by every frame
 
   KeyframeId frame_with_keyframe() {
-    const map::MapSnapshot map = executor->begin_frame(FrameId(frames));
+    const map::MapSnapshot map = executor->begin_frame(FrameId(frames), 0);
     seen.push_back(hash_of(*map, 0));
     const KeyframeId k = world.add_keyframe(FrameId(frames++), map, *executor);
     executor->enqueue(k);
@@ -63,7 +64,7 @@ struct WorldRun {
     frame_without();
     executor->enqueue({Stage::kKeyframe, KeyframeId(), frame});
   }
-  void frame_without() { seen.push_back(hash_of(*executor->begin_frame(FrameId(frames++)), 0)); }
+  void frame_without() { seen.push_back(hash_of(*executor->begin_frame(FrameId(frames++), 0), 0)); }
 
   // A complete run with keyframes in two of three frames, half of them created by a stage, and a restart with an empty
   // map in the middle.
@@ -110,11 +111,40 @@ TEST(StageExecutorParallel, FramesUseTheFirstMapsAndCalibrations) {
       run.frame_with_keyframe();
       // The version after the keyframe, its mapping and, after the fourth and the eighth one, a calibration.
       const MapVersion committed = run.store.snapshot()->version();
-      const map::MapSnapshot next = run.executor->begin_frame(FrameId(1000 + i));
+      const map::MapSnapshot next = run.executor->begin_frame(FrameId(1000 + i), 0);
       EXPECT_GE(next->version(), committed);
       EXPECT_EQ(next->version().value(), 2 * (i + 1) + (i >= 4 ? 1 : 0) + (i >= 8 ? 1 : 0))
           << "mode " << static_cast<int>(mode);
     }
+    run.executor->drain();
+  }
+}
+
+TEST(StageExecutorParallel, FramesAwaitTheMappingOfEarlierKeyframesInRecordedTime) {
+  StageFunctions functions = hashing_stages(7);
+  functions[Stage::kCalibrate] = functions[Stage::kLoop] = {};
+  std::binary_semaphore mapping{0};
+  functions[Stage::kMap] = [real = functions[Stage::kMap], &mapping](const auto& task, const auto& base,
+                                                                     const auto& stop) {
+    mapping.acquire();
+    EXPECT_GT(busy(3'000'000), 0.0);
+    return real(task, base, stop);
+  };
+  for (const bool deferred : {false, true}) {
+    ExecutionSetup s = setup(functions);
+    s.options.await_mapping_s = 0.15;
+    WorldRun run(Mode::kParallel, std::move(s));
+    if (deferred) {  // a stage creates a keyframe from features of one that exists
+      mapping.release();
+      run.frame_with_keyframe();
+      run.executor->drain();
+    }
+    const std::int32_t before = run.store.snapshot()->version().value();
+    deferred ? run.frame_with_deferred_keyframe() : static_cast<void>(run.frame_with_keyframe());
+    run.executor->begin_frame(FrameId(100), 140'000'000);  // does not wait for the mapping, which has not begun
+    mapping.release();
+    const map::MapSnapshot seen = run.executor->begin_frame(FrameId(101), 160'000'000);
+    EXPECT_EQ(seen->version().value(), before + 2) << deferred;  // the keyframe and its mapping
     run.executor->drain();
   }
 }
@@ -124,7 +154,7 @@ TEST(MapGate, KeepsNoJournalIfDisabled) {
   map::MapStore store{world.empty_map()};
   MapGate gate(store, false);
   const auto executor = make_stage_executor(execution::Mode::kSequential, gate, setup(hashing_stages(1)));
-  executor->enqueue(world.add_keyframe(FrameId(0), executor->begin_frame(FrameId(0)), *executor));
+  executor->enqueue(world.add_keyframe(FrameId(0), executor->begin_frame(FrameId(0), 0), *executor));
   EXPECT_GT(gate.newest()->version(), MapVersion(1));
   EXPECT_TRUE(gate.journal().entries.empty());
 }
@@ -398,7 +428,7 @@ TEST(StageExecutorParallel, RethrowsAnExceptionOfAnyStageInTheCaller) {
           },
           std::runtime_error);
       if (mode == execution::Mode::kSequential) continue;
-      EXPECT_THROW(run.executor->begin_frame(FrameId(99)), std::runtime_error);
+      EXPECT_THROW(run.executor->begin_frame(FrameId(99), 0), std::runtime_error);
       EXPECT_THROW(run.executor->enqueue(KeyframeId(0)), std::runtime_error);
       EXPECT_THROW(run.executor->drain(), std::runtime_error);
     }

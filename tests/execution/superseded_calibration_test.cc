@@ -37,7 +37,7 @@ StageFunctions scaling_stages() {
 Journal run(StageExecutor& executor, MapGate& gate) {
   const StageWorld world;
   for (int i = 0; i < 73; ++i) {
-    const map::MapSnapshot seen = executor.begin_frame(FrameId(i));
+    const map::MapSnapshot seen = executor.begin_frame(FrameId(i), 0);
     if (i < 13) executor.enqueue(world.add_keyframe(FrameId(i), seen, executor));
   }
   executor.drain();
@@ -88,9 +88,9 @@ TEST(SupersededCalibration, AnInterruptEndsItsSecondRun) {
     const auto executor = make_stage_executor(mode, gate, std::move(setup));
     const StageWorld world;
     for (int i = 0; i < 13; ++i)
-      executor->enqueue(world.add_keyframe(FrameId(i), executor->begin_frame(FrameId(i)), *executor));
+      executor->enqueue(world.add_keyframe(FrameId(i), executor->begin_frame(FrameId(i), 0), *executor));
     int frame = 13;
-    while (gate.newest()->keyframe(KeyframeId(0)).scale < 2) executor->begin_frame(FrameId(frame++));
+    while (gate.newest()->keyframe(KeyframeId(0)).scale < 2) executor->begin_frame(FrameId(frame++), 0);
     executor->interrupt();
     executor->drain();
     EXPECT_DOUBLE_EQ(gate.newest()->keyframe(KeyframeId(0)).scale, 2.0);
