@@ -229,7 +229,7 @@ bool BundledMap::remove_observation(LandmarkId l, KeyframeId k) {
   if (rest.empty()) {
     mark_removed(l, {});
   } else if (landmark(l).reference.keyframe == k) {
-    edit(l).reference = reference_among(rest);
+    replace_reference(l);
   }
   return true;
 }
