@@ -32,6 +32,14 @@ bool same_pose(const geometry::SE3& a, const geometry::SE3& b) {
   return geometry::so3_log(D.rotation()).norm() <= kMaxAngle && D.translation().norm() <= kMaxShift;
 }
 
+// Whether camera `c` may be the first one of a rig: it has the origin of the rig frame, and at most the rotation by
+// which a refined calibration turned it. Other cameras that share an origin are turned further, to see something else.
+bool may_begin_rig(const camera::Rig& given, std::size_t c) {
+  constexpr double kMaxTurn = 0.1;  // rad; a principal point that was wrong by 5 % of the width of 90 degrees
+  const geometry::SE3& T_cam_rig = given.cam_from_rig(c);
+  return T_cam_rig.translation().norm() <= kMaxShift && geometry::so3_log(T_cam_rig.rotation()).norm() <= kMaxTurn;
+}
+
 // Returns true if the name is the original name of other cameras of the rig, but not of this one. Two cameras may have
 // the same calibration, so that only their names distinguish them.
 bool names_another(const camera::Rig& given, std::size_t camera, const std::string& name) {
@@ -90,12 +98,12 @@ std::size_t append_rig(BundledMap& map, const camera::Rig& given_rig, const came
   return first;
 }
 
-// The numbers of cameras of the rigs of a map, in order. A rig begins with a camera in the rig frame, which shares no
-// keyframe with a camera before it.
+// The numbers of cameras of the rigs of a map, in order. A rig begins with a camera that may be its first one and
+// shares no keyframe with a camera before it.
 std::vector<std::size_t> sizes_of_rigs(const BundledMap& map) {
   const std::size_t n = map.rig().size();
   std::vector<std::uint8_t> begins(n);
-  for (std::size_t c = 1; c < n; ++c) begins[c] = same_pose(map.given_rig().cam_from_rig(c), geometry::SE3());
+  for (std::size_t c = 1; c < n; ++c) begins[c] = may_begin_rig(map.given_rig(), c);
   for (const KeyframeId k : map.keyframe_ids()) {
     bool any = false;
     for (std::size_t c = 0; c < n; ++c) {
@@ -176,7 +184,7 @@ void BundledMap::append_cameras(std::shared_ptr<const camera::Rig> rig, std::sha
 std::optional<std::size_t> find_rig(const BundledMap& map, const camera::Rig& rig) {
   std::optional<std::size_t> moved;
   for (std::size_t first = 0; first + rig.size() <= map.rig().size(); ++first) {
-    if (!same_pose(map.given_rig().cam_from_rig(first), geometry::SE3())) continue;  // within another rig
+    if (first > 0 && !may_begin_rig(map.given_rig(), first)) continue;  // within another rig
     const camera::Rig& given = map.given_rig();
     const bool at_begin = contains(given, given, first, rig) || contains(map.rig(), given, first, rig);
     if (!at_begin && !contains_after_moves(map, first, rig)) continue;

@@ -183,6 +183,56 @@ TEST(AppendMap, UsesTheRefinedCalibrationOfTheMapThatIsContinued) {
   EXPECT_FALSE(std::ranges::equal(bearings(map, 2), bearings(other, 0)));
 }
 
+// `rig` with the rotation of camera 0 that a refined calibration of its principal point has.
+std::shared_ptr<const camera::Rig> turned(const camera::Rig& rig, double angle_rad) {
+  std::vector<camera::RigCamera> cameras;
+  for (std::size_t c = 0; c < rig.size(); ++c) cameras.push_back({rig.camera(c), rig.body_from_cam(c)});
+  const geometry::SE3 T_cam0_rig(geometry::so3_exp({0, angle_rad, 0}), geometry::Vector3d::Zero());
+  return std::make_shared<const camera::Rig>(std::move(cameras), T_cam0_rig);
+}
+
+TEST(AppendMap, ARigWithARefinedCalibrationIsKnown) {
+  const auto rig = turned(*synthetic_rig(2), 0.01), refined_again = turned(*rig, 0.015);
+  BundledMap map = pair_map(rig, 32);
+  EXPECT_EQ(find_rig(map, *rig), 0u);
+  EXPECT_FALSE(find_rig(map, *synthetic_rig(2)));
+  map.set_rig(refined_again);
+  EXPECT_EQ(find_rig(map, *rig), 0u);
+  EXPECT_EQ(find_rig(map, *refined_again), 0u);
+  for (int run = 0; run < 2; ++run) {
+    EXPECT_EQ(find_or_append_rig(map, *refined_again), 0u);
+    append_map(map, pair_map(rig, 33));
+  }
+  EXPECT_EQ(map.rig().size(), 2u);
+}
+
+TEST(AppendMap, ARigWithARefinedCalibrationIsKnownInAMapOfSeveralRigs) {
+  using Cameras = std::vector<std::optional<std::size_t>>;
+  const auto rig = synthetic_rig(2), refined = turned(*rig, 0.01);
+  for (const bool refined_first : {false, true}) {
+    const auto &first = refined_first ? refined : rig, &second = refined_first ? rig : refined;
+    BundledMap map = pair_map(first, 34);
+    append_map(map, pair_map(second, 35));
+    EXPECT_EQ(find_rig(map, *first), 0u);
+    EXPECT_EQ(find_rig(map, *second), 2u);
+    EXPECT_EQ(first_cameras_of_rigs(map), (std::vector<std::size_t>{0, 0, 2, 2}));
+    EXPECT_EQ(find_cameras(map, longer_focal_length(*rig)->subset(std::vector<int>{0})), Cameras(4));
+    append_map(map, pair_map(second, 36));
+    append_map(map, pair_map(first, 37));
+    EXPECT_EQ(map.rig().size(), 4u);
+  }
+}
+
+// A camera that is turned about the origin of the rig frame, such as one of a panoramic camera, is no rig of its own,
+// even if it never observes anything.
+TEST(AppendMap, CamerasOfOneOriginAreOneRig) {
+  const auto two = synthetic_rig(2);
+  const geometry::SE3 turn(geometry::so3_exp({0, 0.5, 0}), geometry::Vector3d::Zero());
+  const auto rig =
+      std::make_shared<const camera::Rig>(std::vector<camera::RigCamera>{{two->camera(0), {}}, {two->camera(1), turn}});
+  EXPECT_EQ(first_cameras_of_rigs(BundledMap(rig)), (std::vector<std::size_t>{0, 0}));
+}
+
 // A rig whose second camera turned during the recording of its map.
 BundledMap map_with_move(const std::shared_ptr<const camera::Rig>& rig, std::uint64_t seed) {
   BundledMap map = pair_map(rig, seed);
