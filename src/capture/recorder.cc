@@ -70,7 +70,7 @@ Status attach_rig(const camera::Rig& rig, const std::vector<image::Image>& masks
 Result<camera::Rig> rig_as_recorded(const camera::Rig& rig) {
   auto reading = rig_formats::read_bslam_rig(dataset::kLiveRigFile, rig_formats::rig_to_yaml(rig));
   if (!reading) return reading.error();
-  return camera::Rig(std::move(reading->cameras));
+  return camera::Rig(std::move(reading->cameras), reading->T_cam0_rig);
 }
 
 Result<std::unique_ptr<Recorder>> Recorder::create(const std::filesystem::path& path, const camera::Rig& rig,

@@ -63,6 +63,9 @@ class BagRecording : public Recording {
     return live_ && !live_->cameras.empty() ? "rig of bslam live in its recording" : "CameraInfo of a bag";
   }
   Result<camera::RigCamera> calibration(std::size_t camera) const override;
+  geometry::SE3 turn_in_rig(std::size_t camera) const override {
+    return live_ ? live_->turn_of(topics_[cameras_[camera]].name) : geometry::SE3();
+  }
   Status check_calibration(const camera::Rig& rig) const override {
     return live_ ? check_masks(store_->files().front()->path(), rig) : Status();
   }

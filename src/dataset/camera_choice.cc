@@ -150,7 +150,7 @@ std::optional<camera::Rig> whole_rig(const Recording& recording) {
     if (!calibration) return std::nullopt;
     cameras.push_back(*std::move(calibration));
   }
-  return camera::Rig(std::move(cameras));
+  return camera::Rig(std::move(cameras), recording.turn_in_rig(0));
 }
 
 }  // namespace
@@ -242,7 +242,8 @@ Result<ChosenRig> choose_own(const DatasetRequest& request, const Recording& rec
     if (!calibration) return calibration.error();
     calibrated.push_back(*std::move(calibration));
   }
-  return ChosenRig{*cameras, camera::Rig(std::move(calibrated)), std::nullopt, {}, *cameras};
+  camera::Rig rig(std::move(calibrated), recording.turn_in_rig(static_cast<std::size_t>(cameras->front())));
+  return ChosenRig{*cameras, std::move(rig), std::nullopt, {}, *cameras};
 }
 
 }  // namespace bslam::dataset

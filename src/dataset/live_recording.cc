@@ -38,6 +38,10 @@ const camera::RigCamera* LiveRecording::camera_of(const std::string& topic) cons
   return found == topics.end() || index >= cameras.size() ? nullptr : &cameras[index];
 }
 
+geometry::SE3 LiveRecording::turn_of(const std::string& topic) const {
+  return !topics.empty() && topic == topics.front() ? T_cam0_rig : geometry::SE3();
+}
+
 std::optional<int> LiveRecording::number_of(const std::string& topic) const {
   const auto index = static_cast<std::size_t>(std::ranges::find(topics, topic) - topics.begin());
   return index < numbers.size() ? std::optional(numbers[index]) : std::nullopt;
@@ -80,6 +84,7 @@ std::optional<LiveRecording> live_recording_of(const containers::MessageFile& fi
     out.warnings.push_back(reading.error().message() + "; the rig in the recording is not used");
   } else if (reading->cameras.size() == out.topics.size()) {
     out.cameras = std::move(reading->cameras);
+    out.T_cam0_rig = reading->T_cam0_rig;
   } else {
     out.warnings.push_back(
         fmt::format("{}: the rig in the recording has {} cameras, but there are {} topics; the rig is not used",

@@ -26,10 +26,13 @@ struct LiveRecording {
   // For each topic: index of the camera in the rig file; empty if missing or invalid.
   std::vector<int> numbers;
   std::vector<camera::RigCamera> cameras;  // for each topic: the calibration; empty if the rig cannot be read
+  geometry::SE3 T_cam0_rig;                // of the first topic; see camera::Rig
   std::vector<std::string> warnings;       // reasons for the user why the rig cannot be read
 
   // Returns the calibration of a topic, or nullptr.
   const camera::RigCamera* camera_of(const std::string& topic) const;
+  // Returns T_cam0_rig if the topic is that of camera 0, or else the identity.
+  geometry::SE3 turn_of(const std::string& topic) const;
   // Returns the number of the camera of a topic in the rig file of the run, or nullopt.
   std::optional<int> number_of(const std::string& topic) const;
 };

@@ -26,6 +26,9 @@ class Recording {
   virtual std::string calibration_origin() const { return {}; }
   // Returns the calibration in the data set.
   virtual Result<camera::RigCamera> calibration(std::size_t camera) const = 0;
+  // Returns the rotation by which a refined calibration turned the camera in the rig frame, if it is camera 0 of the
+  // rig in the data set and that says so: T_cam0_rig of camera::Rig.
+  virtual geometry::SE3 turn_in_rig(std::size_t /*camera*/) const { return {}; }
   // Returns the error if a file that the calibration of the data set names does not exist. `rig`: the cameras in use.
   virtual Status check_calibration(const camera::Rig& /*rig*/) const { return {}; }
   // Returns the number of a camera in the rig file with which it was recorded, if that has more cameras.

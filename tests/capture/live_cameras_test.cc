@@ -283,6 +283,16 @@ TEST_F(LiveCamerasTest, RecordedRigIsThatOfTheRun) {
   }
 }
 
+TEST_F(LiveCamerasTest, RecordedRigHasTheRigFrameOfARefinedCalibration) {
+  const geometry::SE3 T_cam0_rig(geometry::so3_exp({0, 0.01, 0}), geometry::Vector3d::Zero());
+  const camera::Rig rig(
+      {{rig_.camera(std::size_t{0}), rig_.body_from_cam(0)}, {rig_.camera(std::size_t{1}), rig_.body_from_cam(1)}},
+      T_cam0_rig);
+  const auto recorded = rig_as_recorded(rig);
+  ASSERT_TRUE(recorded.ok());
+  EXPECT_LT((recorded->cam_from_rig(0).matrix() - T_cam0_rig.matrix()).norm(), 1e-13);
+}
+
 TEST_F(LiveCamerasTest, TellsWhatWasNotUsed) {
   auto live = open(eventful());
   script_->open_gate();

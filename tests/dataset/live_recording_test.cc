@@ -61,6 +61,25 @@ TEST_F(LiveRecordingTest, HasTheFramesAndTheRigOfTheRun) {
   EXPECT_TRUE(data->warnings.empty()) << data->warnings.front();
 }
 
+// `rig` with the rotation of camera 0 that a refined calibration of its principal point has.
+camera::Rig turned(const camera::Rig& rig) {
+  std::vector<camera::RigCamera> cameras;
+  for (std::size_t c = 0; c < rig.size(); ++c) cameras.push_back({rig.camera(c), rig.body_from_cam(c)});
+  return camera::Rig(std::move(cameras), {geometry::so3_exp({0, 0.01, 0}), geometry::Vector3d::Zero()});
+}
+
+TEST_F(LiveRecordingTest, HasTheRigFrameOfARefinedCalibration) {
+  write(rig_formats::rig_to_yaml(turned(rig_)));
+  const auto turn_of = [](const camera::Rig& rig) { return geometry::so3_log(rig.cam_from_rig(0).rotation()).norm(); };
+  const auto data = open_dataset({.path = path()});
+  ASSERT_TRUE(data.ok()) << data.error().message();
+  EXPECT_NEAR(turn_of(data->rig), 0.01, 1e-12);
+  EXPECT_NEAR(turn_of(open_dataset({.path = path(), .cameras = {0}})->rig), 0.01, 1e-12);
+  EXPECT_EQ(turn_of(open_dataset({.path = path(), .cameras = {1}})->rig), 0);
+  EXPECT_EQ(turn_of(open_dataset({.path = path(), .topics = {kTopics[1], kTopics[0]}})->rig), 0);
+  EXPECT_NEAR(turn_of(open_dataset({.path = path(), .topics = {kTopics[0]}})->rig), 0.01, 1e-12);
+}
+
 // Of a run that did not use all cameras of its rig file.
 TEST_F(LiveRecordingTest, HasTheNumbersOfItsCamerasInTheRigFile) {
   write(rig_formats::rig_to_yaml(rig_), {1, 3});
