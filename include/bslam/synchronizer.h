@@ -43,7 +43,8 @@ struct SyncOptions {
   // Maximum time difference between images of one camera that arrive out of order; if it is larger, they may be too
   // late. Bundles wait so much longer for such images, but not longer than max_wait_s.
   double reorder_s = 0;
-  double silent_after_s = 1;  // a camera without an image for this long is ignored until it delivers again
+  // A camera without an image for this long, and for four of its image intervals, is ignored until it delivers again.
+  double silent_after_s = 1;
   // If the clock of a camera steps ahead by more than max_wait_s and the other cameras go on as before, its images are
   // dropped until its clock returns or the others have been silent for silent_after_s. If the clocks of all cameras
   // step, or there are no others, the step is accepted, but if it is longer than this time and than four intervals of

@@ -323,6 +323,35 @@ TEST(Synchronizer, AcceptsSlowCameras) {
   EXPECT_LE(feed.count(DropReason::kFarAhead), 4u);  // until the rate is known
 }
 
+// A camera is not silent as long as its next image is not due, however slow it is.
+TEST(Synchronizer, WaitsForSlowCameras) {
+  constexpr int kCount = 30;
+  for (const std::int64_t interval_ms : {1000, 1001, 2000, 5000}) {
+    Random random(10);
+    std::vector<Shot> shots = regular(2, kCount, interval_ms);
+    for (Shot& shot : shots) shot.time_ns += random.below(200'001);  // jitter of 0.2 ms
+    Feed feed(2);
+    feed.push(shots);
+    const Times bundles = feed.close();
+    const auto complete = std::ranges::count_if(bundles, [](const auto& b) { return b[0] >= 0 && b[1] >= 0; });
+    EXPECT_GE(complete, kCount - 4) << interval_ms << " ms";  // until the rate is known
+  }
+}
+
+TEST(Synchronizer, WaitsForASlowCameraBesideAFastOne) {
+  std::vector<Shot> shots;
+  for (int k = 0; k < 400; ++k) {
+    shots.push_back({0, k * 50 * kMs});
+    if (k % 40 == 0) shots.push_back({1, k * 50 * kMs + kMs});
+  }
+  Feed feed(2);
+  feed.push(shots);
+  EXPECT_EQ(feed.close().size(), 400u);
+  const auto complete = std::ranges::count_if(feed.bundles, [](const auto& b) { return b[0] >= 0 && b[1] >= 0; });
+  EXPECT_GE(complete, 8) << "until the rate is known";
+  EXPECT_LE(feed.dropped.size(), 2u);
+}
+
 // Whether a thread of this process sleeps in the kernel.
 bool asleep(long thread) {
   std::ifstream file("/proc/self/task/" + std::to_string(thread) + "/stat");
