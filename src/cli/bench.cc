@@ -67,7 +67,6 @@ RunOutcome run_sequence(const BenchArguments& a, const Sequence& sequence, int r
     return outcome;
   };
   std::error_code error;
-  fs::remove_all(folder, error);
   fs::create_directories(folder, error);
   if (error) return failed(folder.string() + ": " + error.message(), kExitBadInput);
   const auto words = run_words(a, sequence.folder.string(), rig_of(a, sequence), folder, run);

@@ -34,7 +34,6 @@ struct TimedRun {
 Result<TimedRun> run_once(const BenchArguments& a, int run, const std::stop_token& stop) {
   const fs::path folder = fs::path(a.out) / fmt::format("run{}", run);
   std::error_code error;
-  fs::remove_all(folder, error);
   fs::create_directories(folder, error);
   if (error) return Error{folder.string(), "--out", error.message(), "a folder that can be created"};
   constexpr int kSeed = 1;

@@ -280,7 +280,9 @@ TEST_F(CommandLine, BenchReportsEverySequenceAndFailsIfOneFailed) {
   const fs::path root = folder_ / "sequences";
   fs::create_directories(root / "broken/mav0/cam0");
   fs::create_directory_symlink(data(), root / "tour");
-  const Ran ran = run("bench " + root.string() + " --runs 5 --out " + out("bench") +
+  const std::string notes = out("bench") + "/tour/run1/notes.txt";
+  support::write_text(notes, "of the user");
+  const Ran ran = run("bench " + root.string() + " --runs 5 --overwrite --out " + out("bench") +
                       " --mode sequential --cameras 0,1 --set features.per_image=500");
   EXPECT_EQ(ran.status, 2) << ran.err;
   const std::string report = read_text(out("bench") + "/report.md");
@@ -294,6 +296,7 @@ TEST_F(CommandLine, BenchReportsEverySequenceAndFailsIfOneFailed) {
   EXPECT_FALSE(fs::exists(out("bench") + "/tour/run3"));
   EXPECT_NE(read_text(out("bench") + "/report.html").find("<td>tour</td>"), std::string::npos);
   EXPECT_TRUE(fs::exists(out("bench") + "/tour/run2/trajectory.tum"));
+  EXPECT_TRUE(fs::exists(notes));
 }
 
 TEST_F(CommandLine, BenchRejectsAFolderWithoutSequences) {

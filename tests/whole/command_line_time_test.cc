@@ -36,9 +36,11 @@ TEST_F(CommandLine, TimesOfARecordingCountTheSameWorkInEveryRun) {
   ordered_json changed = times;
   changed["work"]["solver_steps"] = 1;
   support::write_text(out("changed.json"), changed.dump());
+  support::write_text(out("times2/run1/notes.txt"), "of the user");
   const Ran differs = run(bench + out("times2") + " --overwrite" + against + out("changed.json"));
   EXPECT_EQ(differs.status, 1) << differs.err;
   EXPECT_NE(differs.out.find("DIFFERS\n"), std::string::npos) << differs.out;
+  EXPECT_TRUE(fs::exists(out("times2/run1/notes.txt")));
 
   changed.erase("stages");
   support::write_text(out("changed.json"), changed.dump());
