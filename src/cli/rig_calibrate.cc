@@ -7,11 +7,13 @@
 #include <vector>
 
 #include "base/atomic_file.h"
+#include "base/output_file.h"
 #include "cli/config_arguments.h"
 #include "cli/dataset_arguments.h"
 #include "cli/interruption.h"
 #include "cli/progress_bar.h"
 #include "cli/verbs.h"
+#include "rig_formats/rig_file.h"
 #include "session/rig_calibration.h"
 #include "storage/vocabulary_file.h"
 
@@ -29,12 +31,18 @@ struct CalibrateArguments {
   bool overwrite = false;
 };
 
+// The file must not be one of the input, and is replaced only if it is a calibration of any format.
 Status check_out(const CalibrateArguments& a) {
-  std::error_code error;
-  if (fs::is_directory(a.out, error)) return Error{a.out, "--out", "a folder", "the name of a file"};
-  if (fs::exists(a.out, error) && !a.overwrite)
-    return Error{a.out, "--out", "an existing file", "a new name, or --overwrite"};
-  return check_writable(a.out);
+  std::vector<fs::path> inputs(a.paths.begin(), a.paths.end());
+  inputs.emplace_back(a.config.file);
+  const std::vector<std::string> calibrations = a.data.rig.empty() ? a.paths : std::vector{a.data.rig};
+  for (const std::string& calibration : calibrations) {
+    const std::vector<fs::path> files = rig_formats::files_of_rig(calibration);
+    inputs.insert(inputs.end(), files.begin(), files.end());
+  }
+  if (Status s = check_not_input(a.out, "--out", inputs); !s) return s;
+  const bool is_calibration = rig_formats::read_rig_file(a.out).ok();
+  return check_output_file(a.out, "--out", a.overwrite, is_calibration ? "" : "bslam_rig:");
 }
 
 // All recordings must be of one rig: that of --rig, or the first one's.

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "base/cores.h"
+#include "base/output_file.h"
 #include "cli/print_message.h"
 #include "cli/progress_bar.h"
 #include "cli/verbs.h"
@@ -91,22 +92,16 @@ TrainingSet extract_all(const std::vector<std::filesystem::path>& files, const V
   return set;
 }
 
-// Checks the output file before the training, which takes long.
-Status check_output(const VocabTrainArguments& a) {
-  std::error_code error;
-  const std::filesystem::path out(a.out), folder = out.has_parent_path() ? out.parent_path() : ".";
-  if (std::filesystem::is_directory(out, error)) return Error{a.out, "--out", "a folder", "the name of a file"};
-  if (!std::filesystem::is_directory(folder, error))
-    return Error{folder.string(), "--out", "no such folder", "an existing folder"};
-  if (std::filesystem::exists(out, error) && !a.overwrite)
-    return Error{a.out, "--out", "an existing file", "a new name, or --overwrite"};
-  return {};
+// Checks the output file before the training, which takes long. No image is replaced.
+Status check_output(const VocabTrainArguments& a, const std::vector<std::filesystem::path>& images) {
+  if (Status s = check_not_input(a.out, "--out", images); !s) return s;
+  return check_output_file(a.out, "--out", a.overwrite, place::kVocabularyBegin);
 }
 
 int run_train(const VocabTrainArguments& a) {
-  if (const Status s = check_output(a); !s) return report_error(s.error());
   const auto files = dataset::find_images(a.images);
   if (!files) return report_error(files.error());
+  if (const Status s = check_output(a, *files); !s) return report_error(s.error());
   if (files->empty())
     return report_error({a.images.front(), "", "no images", "PNG, JPEG, WebP, PNM, BMP or TIFF images"});
   ThreadPool pool(a.threads > 0 ? a.threads : processor_cores());

@@ -8,7 +8,6 @@
 namespace bslam::place {
 namespace {
 
-constexpr std::string_view kMagic = "BSLAMVOC";
 constexpr std::uint32_t kVersion = 1;
 constexpr std::size_t kHeaderBytes = 32;
 
@@ -35,7 +34,7 @@ struct Lengths {
 
 std::string serialise(const Vocabulary& vocabulary) {
   const VocabularyContent& c = vocabulary.content();
-  std::string bytes(kMagic);
+  std::string bytes(kVocabularyBegin);
   bytes.reserve(Lengths{c.kind.size(), c.child_count.size(), c.weight.size()}.total());
   for (const std::size_t n : {std::size_t{kVersion}, c.kind.size(), static_cast<std::size_t>(c.branching),
                               static_cast<std::size_t>(c.levels), c.child_count.size(), c.weight.size()}) {
@@ -51,11 +50,11 @@ std::string serialise(const Vocabulary& vocabulary) {
   return bytes;
 }
 
-bool is_vocabulary(std::string_view bytes) { return bytes.starts_with(kMagic); }
+bool is_vocabulary(std::string_view bytes) { return bytes.starts_with(kVocabularyBegin); }
 
 Result<VocabularyPtr> deserialise(std::string_view bytes) {
   if (!is_vocabulary(bytes))
-    return Error{"", "", "not a bslam vocabulary", "bytes that begin with " + std::string(kMagic)};
+    return Error{"", "", "not a bslam vocabulary", "bytes that begin with " + std::string(kVocabularyBegin)};
   if (bytes.size() < kHeaderBytes)
     return Error{"", "size", std::to_string(bytes.size()) + " bytes", "a complete header"};
   const auto field = [&](std::size_t offset) { return number_at<std::uint32_t>(bytes.data() + offset); };

@@ -23,13 +23,15 @@
 
 namespace bslam::place {
 
+constexpr std::string_view kVocabularyBegin = "BSLAMVOC";
+
 std::string serialise(const Vocabulary& vocabulary);
 
 // Parses a vocabulary. Every length is checked against the number of bytes before memory is allocated for it. Errors
 // (with empty file) name the field: magic, version, size, checksum, or any field rejected by Vocabulary::make.
 Result<VocabularyPtr> deserialise(std::string_view bytes);
 
-// Returns true if the bytes begin with the magic of serialise().
+// Returns true if the bytes begin with kVocabularyBegin.
 bool is_vocabulary(std::string_view bytes);
 
 }  // namespace bslam::place

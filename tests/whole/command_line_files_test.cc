@@ -1,4 +1,6 @@
 // The command-line program: what becomes of files that exist already, and numbers that are none.
+#include <array>
+#include <fstream>
 #include <map>
 #include <vector>
 
@@ -51,6 +53,37 @@ TEST_F(CommandLine, ARunThatIsKilledLeavesTheEarlierResultsInAFolderOfTheirOwn) 
   EXPECT_EQ(run(again + " --end 0.3").status, 0);
   EXPECT_TRUE(fs::exists(folder + "/trajectory.tum"));
   EXPECT_FALSE(fs::exists(folder + "/earlier_results"));
+}
+
+TEST_F(CommandLine, NoFileThatIsReadAndNoneOfAnotherKindIsReplaced) {
+  fs::copy(data() + "/rig.yaml", out("rough.yaml"));
+  fs::create_directories(out("photographs"));
+  const auto first = fs::directory_iterator(data() + "/mav0/cam0/data")->path();
+  const std::string photograph = out("photographs/0.png");
+  fs::copy(first, photograph);
+  std::ofstream(out("photographs/1.png"));  // empty
+  support::write_text(out("notes.txt"), "mine");
+  support::write_text(out("settings.yaml"), "features: {per_image: 500}\n");
+  const std::string calibrate = "rig calibrate " + data() + " --cameras 0,1 --overwrite --config " +
+                                out("settings.yaml") + " --rig " + out("rough.yaml") + " --out ",
+                    train = "vocab train " + out("photographs") + " --overwrite --out ",
+                    is_read = "--out: found a file that this command reads",
+                    is_other = "an existing file of another kind";
+  const std::string uncalibrated = "rig calibrate " + data() + " --overwrite --out ";
+  const std::vector<std::array<std::string, 3>> all = {{uncalibrated, data() + "/rig.yaml", is_read},
+                                                       {calibrate, out("rough.yaml"), is_read},
+                                                       {calibrate, out("settings.yaml"), is_read},
+                                                       {calibrate, out("notes.txt"), is_other},
+                                                       {calibrate, photograph, is_other},
+                                                       {train, photograph, is_read},
+                                                       {train, out("photographs/1.png"), is_read},
+                                                       {train, out("notes.txt"), is_other}};
+  for (const auto& [command, file, message] : all) {
+    const std::string before = read_text(file);
+    expect_rejected(command + file);
+    EXPECT_NE(read_text(out("stderr")).find(message), std::string::npos) << read_text(out("stderr"));
+    EXPECT_EQ(read_text(file), before);
+  }
 }
 
 TEST_F(CommandLine, EvalSaysIfItsFilesAreExchanged) {

@@ -182,6 +182,7 @@ TEST_F(CommandLine, VocabulariesCanBeTrainedDescribedAndUsed) {
   ASSERT_EQ(run(train + "--threads 2 --out " + out("two.bvoc")).status, 0);
   EXPECT_EQ(read_text(out("one.bvoc")), read_text(out("two.bvoc")));
   expect_rejected(train + "--out " + out("one.bvoc"));  // exists already, and --overwrite is not given
+  EXPECT_EQ(run(train + "--overwrite --out " + out("one.bvoc")).status, 0);
   const Ran info = run("vocab info " + out("one.bvoc"));
   EXPECT_NE(info.out.find("branching    6\nlevels       3\nwords        216\n"), std::string::npos) << info.out;
 
