@@ -216,14 +216,14 @@ int run_live(const LiveArguments& a, const system::Config& config, const LiveRig
   input.options.progress = [&bar](std::size_t done, std::size_t all) { bar.show(done, all); };
   input.before = [&]() -> Status {
     if (!quiet) print_warnings(session::warnings_before_run(dataset));
-    if (!a.record.empty()) {
-      auto started = start_recording(a.record, rig, cameras);
-      if (!started) return started.error();
-      recorder = *std::move(started);
-    }
     cameras.begin();
     if (a.duration_s) timer.emplace(*a.duration_s, [&cameras] { cameras.stop(); });
-    dataset.first_time_ns = cameras.wait_for_frame().value_or(*first_time_ns);  // time of the first processed frame
+    const auto first_of_run_ns = cameras.wait_for_frame();
+    dataset.first_time_ns = first_of_run_ns.value_or(*first_time_ns);
+    if (a.record.empty() || !first_of_run_ns) return {};  // an earlier recording stays if there is no frame
+    auto started = start_recording(a.record, rig, cameras);
+    if (!started) return started.error();
+    recorder = *std::move(started);
     return {};
   };
   input.after = [&] {

@@ -119,7 +119,7 @@ storage::MapFileInfo map_info(const session::RunRecord& record, const place::Voc
 // Whether a file that was asked for is written.
 bool is_written(const std::string& file, const session::RunRecord& record) {
   std::error_code error;
-  return !file.empty() && !(session::interrupted_at_once(record) && std::filesystem::exists(file, error));
+  return !file.empty() && !(session::ended_at_once(record) && std::filesystem::exists(file, error));
 }
 
 // Writes all files that can be written, in place of those of the earlier run. Returns the errors of the others.
@@ -138,6 +138,10 @@ std::vector<Error> write_files(const session::SessionResult& result, const syste
     note(write_atomically(arguments.journal, execution::journal_text(result.journal)));
   if (is_written(arguments.save_map, result.record)) note(storage::write_map(*result.map, info, arguments.save_map));
   return errors;
+}
+
+Status show_in_rerun(const SlamArguments& arguments, const session::RunRecord& record) {
+  return is_written(arguments.rerun, record) ? send_to_rerun(arguments.out, arguments.rerun) : Status();
 }
 
 // Shows the report of the run in the browsers that have followed it.
@@ -292,17 +296,16 @@ int run_and_write(const SlamArguments& arguments, RunInput input, session::RunCo
   auto result = session::run_session(dataset, options);
   const std::vector<std::string> of_source = input.after ? input.after() : std::vector<std::string>();
   if (!result) return report_error(result.error());
-  if (session::interrupted_at_once(result->record) && earlier->any()) {
-    print_message("interrupted before the first frame; the earlier results in {} are kept\n", arguments.out);
-    return kExitInterrupted;
+  if (session::ended_at_once(result->record) && earlier->any()) {
+    print_message("the run ended before its first frame; the earlier results in {} are kept\n", arguments.out);
+    return exit_status_of(*result);
   }
   if (arguments.image_stamps) result->subtracted_ns = dataset.rig.camera(0).time_offset_ns;
   const std::vector<std::string> warnings = note_warnings(input, of_map, of_source, result->record);
   if (!result->record.memory.parts.empty()) note_report_size(*result, input.config, dataset, arguments);
   const storage::MapFileInfo info = map_info(result->record, **vocabulary, map_warning);
   const std::vector<Error> unwritten = write_files(*result, input.config, dataset, arguments, info, *earlier);
-  const Status sent =
-      arguments.rerun.empty() || !unwritten.empty() ? Status() : send_to_rerun(arguments.out, arguments.rerun);
+  const Status sent = unwritten.empty() ? show_in_rerun(arguments, result->record) : Status();
   end_view(view->get(), *result, input.config, dataset, arguments);
   print_after(result->record, warnings, arguments);
   std::fflush(stdout);  // so that the result appears before the errors about files

@@ -124,7 +124,7 @@ bool mostly_lost(const RunRecord& record) {
   return std::ranges::count_if(record.frames, unexplained) > count(record, FrameOutcome::kTracked);
 }
 
-bool interrupted_at_once(const RunRecord& record) { return !record.complete && record.frames.empty(); }
+bool ended_at_once(const RunRecord& record) { return record.frames.empty(); }
 
 std::int64_t frames_in_loaded_map(const RunRecord& record) {
   std::int64_t frames = 0;

@@ -214,8 +214,8 @@ bool never_started(const RunRecord& record);
 // Whether several cameras found no pose for most frames although there were images with features.
 bool mostly_lost(const RunRecord& record);
 
-// Whether the run was interrupted before its first frame: it has no results that could replace those of an earlier one.
-bool interrupted_at_once(const RunRecord& record);
+// Whether the run ended before its first frame: it has no results that could replace those of an earlier one.
+bool ended_at_once(const RunRecord& record);
 
 // Returns the number of frames with a pose in the world frame of the loaded map.
 std::int64_t frames_in_loaded_map(const RunRecord& record);

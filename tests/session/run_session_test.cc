@@ -403,12 +403,12 @@ TEST_F(Session, EndsWhenInterrupted) {
   EXPECT_FALSE(result->record.complete);
   EXPECT_EQ(result->record.frames.size(), 3u);
   EXPECT_EQ(result->trajectories.front().poses.size(), 3u);
-  EXPECT_FALSE(interrupted_at_once(result->record));
+  EXPECT_FALSE(ended_at_once(result->record));
   const auto nothing = run_session(dataset(), o);
   ASSERT_TRUE(nothing.ok());
   EXPECT_FALSE(nothing->record.complete);
   EXPECT_TRUE(nothing->record.frames.empty());
-  EXPECT_TRUE(interrupted_at_once(nothing->record));
+  EXPECT_TRUE(ended_at_once(nothing->record));
   fs::create_directory(folder() / "nothing");
   EXPECT_TRUE(write_outputs(*nothing, o.config, folder() / "nothing").empty());
 }

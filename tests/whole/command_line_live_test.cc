@@ -1,4 +1,8 @@
 // The command-line program: live runs, and what they record.
+#include <algorithm>
+#include <map>
+#include <vector>
+
 #include "whole/command_line.h"
 
 namespace bslam {
@@ -53,6 +57,30 @@ TEST_F(CommandLine, CtrlCEndsALiveRunWithAllItsFiles) {
   EXPECT_GT(summary["frames"]["tracked"], 0);
   EXPECT_TRUE(fs::exists(folder + "/trajectory.tum"));
   EXPECT_EQ(run("data info " + file).err, "");
+}
+
+// The only images of these cameras come before the run begins.
+TEST_F(CommandLine, ALiveRunWithoutAFrameKeepsEarlierFiles) {
+  std::string cameras;
+  for (const char* name : {"cam0", "cam1"}) {
+    const fs::path images = fs::path(data()) / "mav0" / name / "data", first = folder_ / "first_image" / name;
+    std::vector<fs::path> files;
+    for (const auto& entry : fs::directory_iterator(images)) files.push_back(entry.path());
+    fs::create_directories(first);
+    fs::copy(std::ranges::min(files), first);
+    cameras += first.string() + ",";
+  }
+  const std::map<std::string, std::string> earlier = {
+      {out("frameless/summary.json"), "{}"}, {out("site.bmap"), "BSLAMMAP"}, {out("walk.mcap"), "\x89MCAP0\r\n"}};
+  for (const auto& [file, text] : earlier) support::write_text(file, text);
+  const Ran ran = run("live --rig " + data() + "/rig.yaml --cameras " + cameras + "-,- --overwrite --out " +
+                      out("frameless") + " --save-map " + out("site.bmap") + " --record " + out("walk.mcap"));
+  EXPECT_EQ(ran.status, 3) << ran.err;
+  EXPECT_NE(
+      ran.err.find("the run ended before its first frame; the earlier results in " + out("frameless") + " are kept\n"),
+      std::string::npos)
+      << ran.err;
+  for (const auto& [file, text] : earlier) EXPECT_EQ(read_text(file), text) << file;
 }
 
 TEST_F(CommandLine, RejectsBadRequestsForLiveRuns) {
