@@ -8,6 +8,7 @@
 #include "api/rig_impl.h"
 #include "base/stopwatch.h"
 #include "capture/pixels.h"
+#include "capture/silence.h"
 
 namespace bslam::capture {
 namespace {
@@ -131,11 +132,11 @@ void LiveCameras::run(std::size_t c, const std::stop_token& stop) {
 
 void LiveCameras::capture(std::size_t c, const std::stop_token& stop) {
   CameraState& camera = cameras_[c];
-  Clock::time_point last = Clock::now();
+  Silence silence({options_.silence, options_.first_image}, Clock::now());
   while (!stop.stop_requested()) {
     if (!camera.device) {
       if (!reopen(c, stop)) continue;
-      last = Clock::now();
+      silence.opened(Clock::now());
     }
     const auto image = camera.device->read(kReadTimeout);
     if (!image) {
@@ -146,9 +147,9 @@ void LiveCameras::capture(std::size_t c, const std::stop_token& stop) {
     if (image->state == DeviceImage::State::kDamaged) count_damaged(c);
     if (image->state == DeviceImage::State::kImage) {
       take(c, *image);
-      last = Clock::now();
-    } else if (Clock::now() - last > options_.silence) {
-      lose(c, fmt::format("no image for {:g} s", std::chrono::duration<double>(options_.silence).count()));
+      silence.image(Clock::now());
+    } else if (const auto limit = silence.exceeded(camera.stream.fps, Clock::now())) {
+      lose(c, fmt::format("no image for {:.3g} s", limit->count()));
     }
   }
 }
@@ -268,7 +269,9 @@ Result<TimeNs> LiveCameras::wait_for_first_frame() {
   const auto seen = [this] {
     return std::ranges::all_of(cameras_, [](const CameraState& c) { return c.images > 0; }) && !waiting_.empty();
   };
-  changed_.wait_for(lock, options_.first_image,
+  Silence::Seconds limit = options_.first_image;
+  for (const CameraState& camera : cameras_) limit = Silence::longest(limit, camera.stream.fps);
+  changed_.wait_for(lock, limit,
                     [&] { return seen() || ended_ || stopped_ || std::ranges::any_of(cameras_, &CameraState::lost); });
   if (failure_) std::rethrow_exception(failure_);
   if (seen()) return waiting_.front().time_ns;

@@ -31,10 +31,11 @@ struct LiveOptions {
   StreamRequest request;           // its resolution is that of the rig
   OpenDevice open;
   double sync_tolerance_s = 0.002;
-  std::size_t max_waiting = 3;                   // frames
-  std::chrono::milliseconds silence{2000};       // without an image a camera is opened again
+  std::size_t max_waiting = 3;  // frames
+  // A camera is opened again if it delivers no image for so long, and for three of its intervals.
+  std::chrono::milliseconds silence{2000};
   std::chrono::milliseconds retry{1000};         // between attempts to open a lost camera
-  std::chrono::milliseconds first_image{10000};  // how long is waited for the first images
+  std::chrono::milliseconds first_image{10000};  // how long is waited for the first images, or three intervals
   // Called with lines for the user, such as that a camera was unplugged; by one thread at a time. May be empty.
   std::function<void(const std::string& line)> say = {};
 };

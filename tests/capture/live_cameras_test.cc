@@ -88,8 +88,8 @@ class Script {
 // Camera 0 delivers grey pixels, camera 1 JPEG files.
 class ScriptedDevice : public Device {
  public:
-  ScriptedDevice(std::shared_ptr<Script> script, std::size_t camera, Event::Kind opened)
-      : script_(std::move(script)), camera_(camera), opened_(opened) {}
+  ScriptedDevice(std::shared_ptr<Script> script, std::size_t camera, Event::Kind opened, std::optional<double> fps)
+      : script_(std::move(script)), camera_(camera), opened_(opened), fps_(fps) {}
   ~ScriptedDevice() override { script_->device_ended(); }
 
   Result<Stream> start(const StreamRequest& request) override {
@@ -98,6 +98,7 @@ class ScriptedDevice : public Device {
                   .width = request.width,
                   .height = request.height,
                   .step = camera_ == 0 ? static_cast<std::size_t>(image_.cols) : 0,
+                  .fps = fps_,
                   .identity = opened_ == Event::Kind::kOpensAnother ? "another at usb-2" : "camera at usb-2"};
   }
   Result<DeviceImage> read(milliseconds) override {
@@ -119,6 +120,7 @@ class ScriptedDevice : public Device {
   const std::shared_ptr<Script> script_;
   const std::size_t camera_;
   const Event::Kind opened_;
+  const std::optional<double> fps_;
   cv::Mat image_;
   std::vector<std::uint8_t> bytes_;
 };
@@ -139,6 +141,7 @@ class LiveCamerasTest : public testing::Test {
     LiveOptions options{.paths = {"a", "b"}, .request = {}, .open = opener()};
     options.retry = milliseconds(0);
     options.max_waiting = max_waiting;
+    options.silence = silence_;
     options.say = [this](const std::string& line) { said_.push_back(line); };
     auto live = LiveCameras::open(rig_, std::move(options));
     EXPECT_TRUE(live.ok()) << live.error().message();
@@ -153,7 +156,7 @@ class LiveCamerasTest : public testing::Test {
         if (!event || event->kind == Event::Kind::kDoesNotOpen) return Error{path, "", "no such camera", "a camera"};
         opened = event->kind;
       }
-      return std::unique_ptr<Device>(std::make_unique<ScriptedDevice>(script_, camera, opened));
+      return std::unique_ptr<Device>(std::make_unique<ScriptedDevice>(script_, camera, opened, fps_));
     };
   }
   // All frames until the end.
@@ -172,6 +175,8 @@ class LiveCamerasTest : public testing::Test {
 
   const camera::Rig rig_ = test_rig();
   std::shared_ptr<Script> script_;
+  std::optional<double> fps_;
+  milliseconds silence_{2000};
   std::vector<std::string> said_;
 };
 
@@ -341,6 +346,32 @@ TEST_F(LiveCamerasTest, CameraThatWasUnpluggedIsTakenUpAgain) {
             "cam1 (b): an image came too late for its frame, or its time stamp went back; it is not used, and further "
             "ones are counted");
   EXPECT_EQ(live->notes()[0], "cam1 (b): lost once");
+}
+
+// Without an image it is asked again and again, for longer than the silence of a camera that has delivered some.
+TEST_F(LiveCamerasTest, ACameraMayTakeLongForItsFirstImage) {
+  silence_ = milliseconds(0);
+  std::vector<Event> events(3, Event{Event::Kind::kNone, 0});
+  add_frames(events, 0, 1);
+  const auto live = open(std::move(events));
+  const auto first = live->wait_for_first_frame();
+  ASSERT_TRUE(first.ok()) << first.error().message();
+  EXPECT_TRUE(said_.empty()) << said_.front();
+}
+
+TEST_F(LiveCamerasTest, ASlowCameraIsNotLostBetweenItsImages) {
+  silence_ = milliseconds(0);
+  fps_ = 0.02;
+  std::vector<Event> events;
+  for (int k = 0; k < 5; ++k) {
+    add_frames(events, k, k + 1);
+    events.insert(events.end(), 3, Event{Event::Kind::kNone, 1});
+  }
+  auto live = open(std::move(events));
+  ASSERT_TRUE(live->wait_for_first_frame().ok());
+  script_->wait_for_ends(2);
+  EXPECT_TRUE(said_.empty()) << said_.front();
+  EXPECT_TRUE(live->notes().empty());
 }
 
 TEST_F(LiveCamerasTest, NewestFramesWinAndDroppedOnesAreReported) {
