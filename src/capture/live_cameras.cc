@@ -199,9 +199,10 @@ void LiveCameras::collect() {
       waiting_.pop_front();
       --frames_waiting_;
     }
-    overloaded_ = overloaded_ || (begun_ && frames_waiting_ >= options_.max_waiting);
-    if (frames_waiting_ > options_.max_waiting) {
-      Waiting& oldest = *std::ranges::find(waiting_, false, &Waiting::dropped);
+    Waiting& oldest = *std::ranges::find(waiting_, false, &Waiting::dropped);
+    const std::chrono::nanoseconds span(waiting_.back().time_ns - oldest.time_ns);
+    overloaded_ = overloaded_ || (begun_ && frames_waiting_ >= options_.max_waiting && span >= options_.max_span);
+    if (frames_waiting_ > options_.max_waiting && span > options_.max_span) {
       oldest.dropped = true;
       oldest.bundle.images.clear();
       --frames_waiting_;
@@ -317,6 +318,7 @@ std::optional<session::FrameSource::Item> LiveCameras::next() {
     frames_waiting_ -= !frame.dropped;
     overloaded_ = overloaded_ && frames_waiting_ > 0;
     item.waiting = frames_waiting_;
+    if (!waiting_.empty()) item.waiting_s = to_seconds(waiting_.back().time_ns - frame.time_ns);
   }
   item.images.time_ns = frame.time_ns;
   // Only frames that are recorded are processed.

@@ -31,7 +31,9 @@ struct LiveOptions {
   StreamRequest request;           // its resolution is that of the rig
   OpenDevice open;
   double sync_tolerance_s = 0.002;
-  std::size_t max_waiting = 3;  // frames
+  // Frames that may wait, also if they span a longer time, and the time that they may span, also if they are more.
+  std::size_t max_waiting = 3;
+  std::chrono::milliseconds max_span{100};
   // A camera is opened again if it delivers no image for so long, and for three of its intervals.
   std::chrono::milliseconds silence{2000};
   std::chrono::milliseconds retry{1000};         // between attempts to open a lost camera

@@ -22,6 +22,7 @@ class FrameSource {
     std::optional<TimeNs> next_ns = {};
     bool dropped = false;     // the source had no room for it, because processing was too slow
     std::size_t waiting = 0;  // frames that wait behind it
+    double waiting_s = 0;     // of a live source: time from this frame to the newest one that waits
   };
 
   FrameSource() = default;

@@ -5,15 +5,17 @@
 namespace bslam::session {
 namespace {
 
-constexpr double kLate = 1.0;         // number of frames behind above which the level is raised
-constexpr double kInTime = 0.2;       // maximum number of frames behind at which a frame is in time
+// Number of frames behind and delay above both of which the level is raised. At high rates, a few frames are no delay.
+constexpr double kLate = 1.0, kLate_s = 0.05;
+// Number of frames behind and delay up to either of which a frame is in time.
+constexpr double kInTime = 0.2, kInTime_s = 0.01;
 constexpr double kEffective_s = 0.2;  // time until a change takes effect
 
 }  // namespace
 
-int LoadControl::update(double behind, TimeNs time_ns) {
-  if (behind > kInTime) calm_since_ns_ = time_ns;
-  const bool late = behind > kLate, still_late = late && was_late_;
+int LoadControl::update(double behind, double late_s, TimeNs time_ns) {
+  if (behind > kInTime && late_s > kInTime_s) calm_since_ns_ = time_ns;
+  const bool late = behind > kLate && late_s > kLate_s, still_late = late && was_late_;
   was_late_ = late;
   if (still_late && level_ < kMaxReduction && (level_ == 0 || to_seconds(time_ns - raised_ns_) > kEffective_s)) {
     // The level was lowered too early: next time it takes longer.

@@ -13,8 +13,8 @@ class LoadControl {
   static constexpr double kMinPatience_s = 2, kMaxPatience_s = 32;
 
   // The level for the frame of `time_ns`. `behind`: number of frames by which its processing is late, which is the
-  // delay divided by the time between two frames.
-  int update(double behind, TimeNs time_ns);
+  // delay `late_s` divided by the time between two frames.
+  int update(double behind, double late_s, TimeNs time_ns);
 
  private:
   int level_ = 0;

@@ -86,7 +86,7 @@ class FrameChoice {
     const double late_s = control.lateness_s(item.images.time_ns);
     double behind = static_cast<double>(item.waiting);
     if (item.next_ns) behind = late_s / std::max(kMinInterval_s, to_seconds(*item.next_ns - item.images.time_ns));
-    const int level = reduces_ ? load_.update(behind, item.images.time_ns) : 0;
+    const int level = reduces_ ? load_.update(behind, std::max(late_s, item.waiting_s), item.images.time_ns) : 0;
     const bool drops = options_.late == Late::kDrop && item.waiting > 0 && behind > 1 && late_s > kMaxLateness_s;
     return drops ? std::nullopt : std::optional(level);
   }

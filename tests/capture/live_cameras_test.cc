@@ -398,6 +398,31 @@ TEST_F(LiveCamerasTest, NewestFramesWinAndDroppedOnesAreReported) {
   EXPECT_EQ(items.back().images.time_ns, kStart + 39 * kInterval);
 }
 
+// At a high rate, more frames wait until they span as long as a few frames of a usual rate.
+TEST_F(LiveCamerasTest, FramesOfAHighRateWaitForATenthOfASecond) {
+  constexpr int kFrames = 60;
+  constexpr TimeNs kShort = 5 * kMs;
+  std::vector<Event> events;
+  add_frames(events, -1, 0);
+  events.push_back({Event::Kind::kGate, 0});
+  for (int k = 0; k < kFrames; ++k) {
+    events.push_back({Event::Kind::kImage, 0, kStart + k * kShort});
+    events.push_back({Event::Kind::kImage, 1, kStart + k * kShort - 3 * kMs});
+  }
+  auto live = open(std::move(events), 3);
+  ASSERT_TRUE(live->wait_for_first_frame().ok());
+  live->begin();
+  script_->open_gate();
+  script_->wait_for_ends(2);
+  const auto items = all(*live);
+  const auto processed = std::ranges::count(items, false, &session::FrameSource::Item::dropped);
+  EXPECT_EQ(processed, 21);
+  const auto first = std::ranges::find(items, false, &session::FrameSource::Item::dropped);
+  ASSERT_NE(first, items.end());
+  EXPECT_EQ(first->waiting, 20u);
+  EXPECT_NEAR(first->waiting_s, 0.1, 1e-9);
+}
+
 TEST_F(LiveCamerasTest, LateImagesAreNotBlamedOnTheCameraWhileFramesWait) {
   std::vector<Event> events;
   add_frames(events, 0, 10);

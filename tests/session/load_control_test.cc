@@ -8,9 +8,9 @@ namespace {
 constexpr TimeNs kInterval = 50'000'000;
 
 // Levels after `frames` more frames that are all late by `behind` frames; `now` is advanced.
-int after(LoadControl& control, int frames, double behind, TimeNs& now) {
+int after(LoadControl& control, int frames, double behind, TimeNs& now, TimeNs interval_ns = kInterval) {
   int level = 0;
-  for (int i = 0; i < frames; ++i) level = control.update(behind, now += kInterval);
+  for (int i = 0; i < frames; ++i) level = control.update(behind, behind * to_seconds(interval_ns), now += interval_ns);
   return level;
 }
 
@@ -18,6 +18,17 @@ TEST(SessionLoadControl, KeepsAllWorkWhileFramesAreInTime) {
   LoadControl control;
   TimeNs now = 0;
   EXPECT_EQ(after(control, 1000, 0.9, now), 0);
+}
+
+// At 200 Hz, a few frames are not late, and one or two are in time.
+TEST(SessionLoadControl, DoesNotMistakeAHighRateForALoad) {
+  constexpr TimeNs kShort = 5'000'000;
+  LoadControl control;
+  TimeNs now = 0;
+  EXPECT_EQ(after(control, 1000, 9, now, kShort), 0);
+  EXPECT_EQ(after(control, 2, 12, now, kShort), 1);
+  EXPECT_EQ(after(control, 380, 2, now, kShort), 1);
+  EXPECT_EQ(after(control, 30, 2, now, kShort), 0);
 }
 
 TEST(SessionLoadControl, ReducesTheWorkStepByStep) {

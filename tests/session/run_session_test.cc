@@ -134,6 +134,7 @@ class Backlog : public FrameSource {
     if (!item) return item;
     item->next_ns.reset();
     item->waiting = 2;
+    item->waiting_s = 0.1;
     return item;
   }
 
