@@ -130,6 +130,23 @@ def test_recording_that_cannot_be_read_does_not_stop_the_others(recordings, clus
     assert (tmp_path / "site" / site.recordings[0].map).exists()
 
 
+def test_part_of_a_recording_is_apart(recordings, cluster, two_workers, tmp_path):
+    for camera in ("cam0", "cam1"):
+        (tmp_path / f"part/mav0/{camera}/data").mkdir(parents=True)
+        for image in sorted((recordings[0] / f"mav0/{camera}/data").iterdir())[:16]:
+            (tmp_path / f"part/mav0/{camera}/data" / image.name).symlink_to(image)
+    (tmp_path / "part/rig.yaml").symlink_to(recordings[0] / "rig.yaml")
+    cache = two_workers.folder / "cache"
+    with Client(cluster) as client:
+        site = map_recordings([*recordings[:2], tmp_path / "part"], tmp_path / "site", client=client, cache=cache)
+    states = {r.name: r.state for r in site.recordings}
+    assert states["b"] == "joined"
+    assert sorted(states.values()) == ["apart", "joined", "joined"]
+    (apart,) = [r for r in site.recordings if r.state == "apart"]
+    assert "expected maps without common keyframes" in apart.reason
+    assert str(cache) not in apart.reason
+
+
 def test_requests_that_cannot_be_met(recordings, tmp_path):
     with pytest.raises(bslam.Error, match="cannot open .*nowhere"):
         map_recordings([tmp_path / "nowhere"], tmp_path / "site")

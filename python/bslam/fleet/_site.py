@@ -8,6 +8,7 @@ import json
 import logging
 import os
 import pathlib
+import re
 import signal
 import sys
 from collections.abc import Iterator, Sequence
@@ -28,6 +29,7 @@ from ._sketch import likely_pairs
 
 _FAN_IN = 5  # maps that are merged at once
 _NUMBERS = ("keyframes", "landmarks")  # sizes of a map
+_HASH = re.compile("[0-9a-f]{64}")
 
 
 @dataclass
@@ -217,6 +219,8 @@ class _Mapping:
         self.site = Site(out)
         self.verdicts: dict[tuple[str, str], bool] = {}  # whether the maps of a pair share a place
         self.reasons: dict[str, str] = {}  # by hash of a map: why it shares no place with another map
+        self.refused: list[frozenset[str]] = []  # hashes of maps that cannot be in one map
+        self.names: dict[str, str] = {}  # by hash of a map: what messages call it
 
     def run(self, recordings: list[Recording]) -> Site:
         self.site.recordings = recordings
@@ -228,6 +232,7 @@ class _Mapping:
             else:
                 groups.setdefault(result["map"], []).append((recording, result))
         maps = {key: group[0][1] for key, group in sorted(groups.items())}
+        self.names = {key: group[0][0].name for key, group in groups.items()}
         self._write(
             [(merged, [pair for key in members for pair in groups[key]]) for merged, members in self._merged(maps)]
         )
@@ -257,25 +262,53 @@ class _Mapping:
     def _merged(self, maps: dict[str, Result]) -> list[tuple[Result, tuple[str, ...]]]:
         """The maps of the sites, each with the hashes of the maps in it; the one with most maps first.
 
-        In each round, the most similar pair of maps that connects a site with another site is compared, for every
-        site. Sites that share a place are merged.
+        Maps whose merge is refused are never in one site: the rounds are repeated without it, mostly from the cache.
         """
         pairs = self._likely_pairs(maps)
-        site: dict[str, tuple[str, ...]] = {key: (key,) for key in maps}  # by map: all maps of its site
-        merged: dict[tuple[str, ...], Any] = {(key,): maps[key] for key in maps}  # by site: its merged map
-        merges = []
-        while chosen := _best_pairs(pairs, site):
-            self._compare([pair for pair in chosen if pair not in self.verdicts], maps)
-            pairs = [pair for pair in pairs if self.verdicts.get(pair, True)]
-            _join([pair for pair in chosen if self.verdicts[pair]], site)
-            for members in sorted(set(site.values()) - set(merged)):
-                parts = [merged.pop(part) for part in sorted(merged) if set(part) <= set(members)]
-                merged[members] = self._submit(_tasks.merge, parts)
-                merges.append(merged[members])
-        self._done("merging", merges)
+        while True:
+            merged, merges = self._rounds(pairs, maps)
+            refused = len(self.refused)
+            for members, result in zip(merges, self._done("merging", list(merges.values())), strict=True):
+                self._note_merge(members, result)
+            if len(self.refused) == refused:
+                break
         final = {members: self._submit(_tasks.merge, [merged[members]], True) for members in merged if len(members) > 1}
         merged.update(zip(final, self._done("adjusting", list(final.values())), strict=True))
         return sorted(((m, k) for k, m in merged.items()), key=lambda s: (-len(s[1]), -s[0]["keyframes"], s[1]))
+
+    def _note_merge(self, members: tuple[str, ...], result: Result) -> None:
+        if "error" not in result:
+            self.names[result["map"]] = f"{self.names[members[0]]} and {len(members) - 1} more"
+        elif result["error"]:
+            self._refuse(members, result["error"])
+
+    def _refuse(self, members: Sequence[str], reason: str) -> None:
+        self.refused.append(frozenset(members))
+        self.reasons.update(dict.fromkeys(members, self._with_names(reason)))
+
+    def _with_names(self, text: str) -> str:
+        """The text with what messages call the maps instead of their hashes."""
+        return _HASH.sub(lambda found: self.names.get(found[0], found[0]), text)
+
+    def _rounds(
+        self, pairs: list[tuple[str, str]], maps: dict[str, Result]
+    ) -> tuple[dict[tuple[str, ...], Any], dict[tuple[str, ...], Future]]:
+        """By the hashes of the maps in it: the merged map of each site, and every merge.
+
+        In each round, the most similar pair of maps that connects a site with another site is compared, for every
+        site. Sites that share a place are merged.
+        """
+        site: dict[str, tuple[str, ...]] = {key: (key,) for key in maps}  # by map: all maps of its site
+        merged: dict[tuple[str, ...], Any] = {(key,): maps[key] for key in maps}  # by site: its merged map
+        merges: dict[tuple[str, ...], Future] = {}
+        while chosen := _best_pairs(pairs, site, self.refused):
+            self._compare([pair for pair in chosen if pair not in self.verdicts], maps)
+            pairs = [pair for pair in pairs if self.verdicts.get(pair, True)]
+            _join([pair for pair in chosen if self.verdicts[pair]], site, self.refused)
+            for members in sorted(set(site.values()) - set(merged)):
+                parts = [merged.pop(part) for part in sorted(merged) if set(part) <= set(members)]
+                merged[members] = merges[members] = self._submit(_tasks.merge, parts)
+        return merged, merges
 
     def _likely_pairs(self, maps: dict[str, Result]) -> list[tuple[str, str]]:
         metric = [key for key, m in maps.items() if m["scale"] == "metric"]
@@ -287,7 +320,9 @@ class _Mapping:
         found = self._done("comparing", [self._submit(_tasks.compare, maps[a], maps[b]) for a, b in pairs])
         for pair, verdict in zip(pairs, found, strict=True):
             self.verdicts[pair] = verdict["joined"]
-            if not verdict["joined"]:
+            if "refused" in verdict:
+                self._refuse(pair, verdict["reason"])
+            elif not verdict["joined"]:
                 for key in pair:
                     self.reasons.setdefault(key, verdict["reason"])
 
@@ -339,21 +374,29 @@ def _sketch_in(folder: pathlib.Path) -> np.ndarray[Any, Any]:
         ) from error
 
 
-def _best_pairs(pairs: list[tuple[str, str]], site: dict[str, tuple[str, ...]]) -> list[tuple[str, str]]:
+def _may_join(a: tuple[str, ...], b: tuple[str, ...], refused: list[frozenset[str]]) -> bool:
+    """Whether two sites are different ones, and are not refused together."""
+    together = {*a, *b}
+    return a != b and not any(members <= together for members in refused)
+
+
+def _best_pairs(
+    pairs: list[tuple[str, str]], site: dict[str, tuple[str, ...]], refused: list[frozenset[str]]
+) -> list[tuple[str, str]]:
     """For each site the first pair in the list that connects it with another site."""
     best: dict[tuple[str, ...], tuple[str, str]] = {}
     for a, b in pairs:
-        if site[a] != site[b]:
+        if _may_join(site[a], site[b], refused):
             best.setdefault(site[a], (a, b))
             best.setdefault(site[b], (a, b))
     return list(dict.fromkeys(best.values()))  # in the order of the list; one more recording hardly changes it
 
 
-def _join(pairs: list[tuple[str, str]], site: dict[str, tuple[str, ...]]) -> None:
+def _join(pairs: list[tuple[str, str]], site: dict[str, tuple[str, ...]], refused: list[frozenset[str]]) -> None:
     """Joins the sites of the pairs, at most _FAN_IN at once, so that a large site is merged by several workers."""
     parts = dict.fromkeys(site.values(), 1)
     for a, b in pairs:
-        if site[a] == site[b] or parts[site[a]] + parts[site[b]] > _FAN_IN:
+        if not _may_join(site[a], site[b], refused) or parts[site[a]] + parts[site[b]] > _FAN_IN:
             continue
         members = tuple(sorted(site[a] + site[b]))
         parts[members] = parts[site[a]] + parts[site[b]]

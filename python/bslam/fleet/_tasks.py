@@ -11,6 +11,7 @@ import shutil
 import signal
 import subprocess
 import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,11 +21,15 @@ from .._program import PROGRAM
 from ._cache import Result, cached, content_of, key_of, local_copy, sha256_of
 from ._sketch import sketch
 
-_NOTHING_TRACKED = 3  # exit status
+_NOTHING_TRACKED, _WRONG_INPUT = 3, 2  # exit status
 
 
 class ProgramKilledError(RuntimeError):
     """A signal has ended the program, for example because there was not enough memory."""
+
+
+class RefusedError(_bslam.Error):
+    """The program has refused its input, as it does each time."""
 
 
 def reason_of(error: Exception) -> str:
@@ -103,7 +108,10 @@ def make_map(setup: Setup, recording: str) -> Result:
 
 
 def compare(setup: Setup, a: Result, b: Result) -> Result:
-    """Tests whether two maps share a place: `joined`, or the `reason` why not."""
+    """Tests whether two maps share a place: `joined`, or the `reason` why not.
+
+    `refused` is added if they cannot be in one map. Texts name maps by their hashes.
+    """
     setup.check()
 
     def make(_: pathlib.Path) -> Result:
@@ -111,12 +119,20 @@ def compare(setup: Setup, a: Result, b: Result) -> Result:
         reason = next((i["reason"] for i in verdict["inputs"] if not i["joined"]), "")
         return {"joined": not reason, "reason": reason}
 
-    return cached(setup.cache, "pairs", [setup.program, setup.settings, sorted([a["map"], b["map"]])], make)
+    try:
+        return cached(setup.cache, "pairs", [setup.program, setup.settings, sorted([a["map"], b["map"]])], make)
+    except RefusedError as error:
+        return {"joined": False, "refused": True, "reason": _by_hash(str(error), (a, b)), "computed": True}
 
 
 def merge(setup: Setup, maps: list[Result], final: bool = False) -> Result:
-    """The merged map, with a global bundle adjustment if it is the `final` one."""
+    """The merged map, with a global bundle adjustment if it is the `final` one.
+
+    If the maps cannot be in one map, the result is the `error`, which is empty if it is that of one of the maps.
+    """
     setup.check()
+    if any("error" in m for m in maps):
+        return {"error": "", "computed": False}
 
     def make(folder: pathlib.Path) -> Result:
         options = ["--json", f"--out={folder}/map.bmap", *setup.settings, *([] if final else ["--no-final-ba"])]
@@ -124,7 +140,13 @@ def merge(setup: Setup, maps: list[Result], final: bool = False) -> Result:
         numbers = {name: merged[name] for name in ("keyframes", "landmarks", "submaps")}
         return {"map": sha256_of(folder / "map.bmap"), **numbers}
 
-    return cached(setup.cache, "merged", [setup.program, setup.settings, final, sorted(m["map"] for m in maps)], make)
+    inputs = sorted(m["map"] for m in maps)
+    try:
+        return cached(setup.cache, "merged", [setup.program, setup.settings, final, inputs], make)
+    except RefusedError as error:
+        if len(maps) == 1:
+            raise
+        return {"error": _by_hash(str(error), maps), "computed": True}
 
 
 def transfer(setup: Setup, own: Result, site: Result) -> Result:
@@ -147,12 +169,21 @@ def _map_of(result: Result) -> str:
     return str(pathlib.Path(result["folder"], "map.bmap"))
 
 
+def _by_hash(text: str, maps: Sequence[Result]) -> str:
+    """The text with hashes of maps instead of their files."""
+    for m in maps:
+        text = text.replace(_map_of(m), m["map"])
+    return text
+
+
 def run_program(*arguments: str) -> str:
     """Runs the program and returns what it prints."""
     done = _run(*arguments)
-    if done.returncode != 0:
-        raise _bslam.Error(_message(done))
-    return done.stdout
+    if done.returncode == 0:
+        return done.stdout
+    message = _message(done)
+    refused = done.returncode == _WRONG_INPUT and ", expected " in message  # unlike a file that cannot be written
+    raise (RefusedError if refused else _bslam.Error)(message)
 
 
 def _run(*arguments: str) -> subprocess.CompletedProcess[str]:

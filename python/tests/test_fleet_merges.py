@@ -1,0 +1,107 @@
+"""How maps become sites, with a program that only notes which maps are merged."""
+
+import json
+import pathlib
+import subprocess
+
+import numpy as np
+import pytest
+
+pytest.importorskip("distributed", reason="distributed is not installed: the fleet is not tested")
+
+from bslam.fleet import _tasks
+from bslam.fleet._cache import sha256_of
+from bslam.fleet._site import Recording, _Mapping
+from distributed import Client
+
+
+@pytest.fixture(scope="module")
+def client():
+    """Workers in threads of this process, which run the replaced program."""
+    with Client(processes=False, n_workers=1, threads_per_worker=2, dashboard_address=None) as threads:
+        yield threads
+
+
+class Program:
+    """Merges maps that are lists of recordings. `refusal` is the message about a list that cannot be merged."""
+
+    def __init__(self, refusal=lambda recordings: ""):
+        self.refusal = refusal
+        self.merged = []
+
+    def __call__(self, *arguments):
+        files = [a for a in arguments[2:] if not a.startswith("-")]
+        recordings = sorted(r for file in files for r in pathlib.Path(file).read_text().split())
+        if message := self.refusal(recordings):
+            return subprocess.CompletedProcess(arguments, 2, "", f"bslam: {files[0]}: {message}\n")
+        for out in [a.removeprefix("--out=") for a in arguments if a.startswith("--out=")]:
+            pathlib.Path(out).write_text("\n".join(recordings))
+            self.merged.append(recordings)
+        answer = {
+            "keyframes": len(recordings),
+            "landmarks": 10 * len(recordings),
+            "submaps": 1,
+            "inputs": [{"file": file, "joined": True, "reason": ""} for file in files],
+            "scales": [],
+        }
+        return subprocess.CompletedProcess(arguments, 0, json.dumps(answer), "")
+
+
+@pytest.fixture
+def merge(client, tmp_path, monkeypatch):
+    """The sites of recordings that look alike, as lists of their names, and why recordings are apart."""
+
+    def merged(names, program):
+        monkeypatch.setattr(_tasks, "_run", program)
+        monkeypatch.setattr(_tasks, "make_map", lambda setup, data: made[data])
+        maps, made = {}, {}
+        for number, name in enumerate(names):
+            folder = tmp_path / "given" / name
+            folder.mkdir(parents=True)
+            (folder / "map.bmap").write_text(name)
+            np.save(folder / "sketch.npy", np.full((1 + number, 64), 7, np.uint32))
+            made[name] = {
+                "map": sha256_of(folder / "map.bmap"),
+                "folder": str(folder),
+                "scale": "metric",
+                "keyframes": 1,
+                "landmarks": 10,
+                "computed": True,
+            }
+            maps[made[name]["map"]] = name
+        setup = _tasks.Setup(str(tmp_path / "cache"), _tasks.program_hash())
+        mapping = _Mapping(client, setup, tmp_path / "site", 6, False, set())
+        sites = []
+        monkeypatch.setattr(mapping, "_write", sites.extend)
+        mapping.run([Recording(name, name) for name in names])
+        lists = [sorted(recording.name for recording, _ in members) for _, members in sites]
+        return lists, {name: mapping.reasons.get(key, "") for key, name in maps.items()}
+
+    return merged
+
+
+def test_maps_with_common_keyframes_are_not_in_one_site(merge):
+    def refusal(recordings):
+        both = {"monday", "monday_partial"} <= set(recordings)
+        return "keyframes: found 4 of 5 in another map as well, expected maps without common keyframes" if both else ""
+
+    sites, reasons = merge(["monday", "monday_partial", "tuesday"], Program(refusal))
+    assert sorted(map(len, sites)) == [1, 2]
+    assert not any({"monday", "monday_partial"} <= set(site) for site in sites)
+    (apart,) = next(site for site in sites if len(site) == 1)
+    assert apart.startswith("monday")
+    assert "found 4 of 5 in another map as well" in reasons[apart]
+    assert reasons[apart].startswith("monday")
+    assert "/" not in reasons[apart]
+
+
+@pytest.mark.parametrize("most", [3, 6])
+def test_sites_do_not_grow_beyond_what_can_be_merged(merge, most):
+    program = Program(lambda recordings: "rig: found 104 cameras, expected fewer" if len(recordings) > most else "")
+    names = [f"r{i}" for i in range(9)]
+    sites, _ = merge(names, program)
+    assert sorted(name for site in sites for name in site) == names
+    assert all(1 <= len(site) <= most for site in sites)
+    assert sum(len(site) > 1 for site in sites) > 0
+    for site in sites:
+        assert len(site) == 1 or site in program.merged
