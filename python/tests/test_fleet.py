@@ -147,6 +147,27 @@ def test_part_of_a_recording_is_apart(recordings, cluster, two_workers, tmp_path
     assert str(cache) not in apart.reason
 
 
+def test_all_submaps_of_a_recording_are_kept(recordings, cluster, two_workers, tmp_path):
+    for camera in ("cam0", "cam1"):
+        (tmp_path / f"two_places/mav0/{camera}/data").mkdir(parents=True)
+        for number, place in enumerate((recordings[0], recordings[3])):
+            for image in (place / f"mav0/{camera}/data").iterdir():
+                stamp = int(image.stem) + number * 5_000_000_000
+                (tmp_path / f"two_places/mav0/{camera}/data/{stamp}.png").symlink_to(image)
+    (tmp_path / "two_places/rig.yaml").symlink_to(recordings[0] / "rig.yaml")
+    with Client(cluster) as client:
+        given = [recordings[1], tmp_path / "two_places"]
+        settings = ["looping.recovery.new_submap_after=3"]
+        site = map_recordings(given, tmp_path / "site", client=client, settings=settings)
+        _, both = site.recordings
+        assert both.parts == ["apart/two_places_part2.tum"]
+        assert json.loads((site.folder / "site.json").read_text())["recordings"][1]["parts"] == both.parts
+        poses = [len(np.loadtxt(site.folder / file)) for file in (both.trajectory, *both.parts)]
+        assert sum(poses) > 40  # of 48
+        map_recordings(recordings[:1], site.folder, client=client, cache=two_workers.folder / "cache")
+        assert not (site.folder / both.parts[0]).exists()
+
+
 def test_requests_that_cannot_be_met(recordings, tmp_path):
     with pytest.raises(bslam.Error, match="cannot open .*nowhere"):
         map_recordings([tmp_path / "nowhere"], tmp_path / "site")

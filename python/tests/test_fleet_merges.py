@@ -1,4 +1,4 @@
-"""How maps become sites, with a program that only notes which maps are merged."""
+"""How maps become sites, and trajectories those of sites, with programs that only note what they are asked for."""
 
 import json
 import pathlib
@@ -105,3 +105,42 @@ def test_sites_do_not_grow_beyond_what_can_be_merged(merge, most):
     assert sum(len(site) > 1 for site in sites) > 0
     for site in sites:
         assert len(site) == 1 or site in program.merged
+
+
+def tum(parent, *times):
+    return "".join(
+        [f"# bslam trajectory frame=cam0 parent={parent} final=true\n", *(f"{t} 1 2 3 0 0 0 1\n" for t in times)]
+    )
+
+
+def test_poses_of_further_submaps_are_kept(tmp_path, monkeypatch):
+    """Of four submaps, one becomes part of the first one, one does not, and no keyframe of one is found."""
+    own = {"folder": str(tmp_path / "own"), "map": "1", "parts": [f"trajectory_part{n}.tum" for n in (2, 3, 4)]}
+    (tmp_path / "own").mkdir()
+    given = {
+        "trajectory.tum": tum("world", 10.5, 20.25),
+        "trajectory_part2.tum": tum("world_of_submap_2", 12.5),
+        "trajectory_part3.tum": tum("world_of_submap_3", 15.5, 14.5),
+        "trajectory_part4.tum": tum("world_of_submap_4", 17),
+    }
+    for name, text in given.items():
+        (tmp_path / "own" / name).write_text(text)
+
+    def program(*arguments):
+        name, out = pathlib.Path(arguments[2]).name, arguments[-1].removeprefix("--out=")
+        if name == "trajectory_part4.tum":
+            return subprocess.CompletedProcess(
+                arguments, 2, "", "bslam: map.bmap: keyframes: found none, expected some\n"
+            )
+        pathlib.Path(out).write_text(given[name].replace("world_of_submap_3", "world"))
+        return subprocess.CompletedProcess(arguments, 0, "", "")
+
+    monkeypatch.setattr(_tasks, "_run", program)
+    setup = _tasks.Setup(str(tmp_path / "cache"), _tasks.program_hash())
+    moved = _tasks.transfer(setup, own, {"folder": str(tmp_path / "site"), "map": "2"})
+    assert moved["joined"]
+    assert moved["parts"] == ["trajectory_part2.tum", "trajectory_part4.tum"]
+    folder = pathlib.Path(moved["folder"])
+    assert (folder / "trajectory.tum").read_text() == tum("world", 10.5, 14.5, 15.5, 20.25)
+    for part in moved["parts"]:
+        assert (folder / part).read_text() == given[part]

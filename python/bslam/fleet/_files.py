@@ -17,7 +17,7 @@ from ._tasks import run_program
 
 Path = Union[str, "os.PathLike[str]"]
 
-_RESULT = re.compile(r"site(_\d+)?\.bmap|apart/[^/]+\.bmap|trajectories/[^/]+\.tum")  # names of files of a result
+_RESULT = re.compile(r"site(_\d+)?\.bmap|apart/[^/]+\.(bmap|tum)|trajectories/[^/]+\.tum")  # names of files of a result
 _MASK = re.compile(r'^    mask: "(.*)"$', re.MULTILINE)  # in a rig file that the program has written
 
 
@@ -87,7 +87,9 @@ def _files_of_earlier_result(summary: pathlib.Path, overwrite: bool) -> set[str]
 
 def files_of(summary: dict[str, Any]) -> set[str]:
     """The files that the summary of a site names for its recordings. Raises ValueError for names of other files."""
-    names = {os.fspath(r[kind]) for r in summary["recordings"] for kind in ("map", "trajectory") if r[kind]}
+    recordings = summary["recordings"]
+    names = {os.fspath(r[kind]) for r in recordings for kind in ("map", "trajectory") if r[kind]}
+    names.update(os.fspath(part) for r in recordings for part in r.get("parts", []))
     if other := [name for name in names if not _RESULT.fullmatch(name)]:
         raise ValueError(f"{other[0]} is not the name of a result")
     return names

@@ -43,6 +43,7 @@ class Recording:
         reason: why it was not joined.
         map: map file, relative to the folder of the result.
         trajectory: file with its trajectory in that map.
+        parts: files with the poses in further submaps, whose frames are not related to that of the map.
     """
 
     name: str
@@ -51,6 +52,7 @@ class Recording:
     reason: str = ""
     map: str = ""
     trajectory: str = ""
+    parts: list[str] = field(default_factory=list)
 
 
 @dataclass
@@ -341,9 +343,16 @@ class _Mapping:
                     r.reason = self._reason(own["map"], len(members) > 1)
                     r.map, source = f"apart/{r.name}.bmap", own
                     _files.copy(pathlib.Path(own["folder"], "map.bmap"), self.site.folder / r.map)
-                r.trajectory = f"trajectories/{r.name}.tum"
-                _files.copy(pathlib.Path(source["folder"], "trajectory.tum"), self.site.folder / r.trajectory)
+                self._write_trajectories(r, source)
         self._write_summary()
+
+    def _write_trajectories(self, recording: Recording, source: Result) -> None:
+        recording.trajectory = f"trajectories/{recording.name}.tum"
+        files = {"trajectory.tum": recording.trajectory}
+        files.update({part: f"apart/{recording.name}{part.removeprefix('trajectory')}" for part in source["parts"]})
+        recording.parts = [files[part] for part in source["parts"]]
+        for name, file in files.items():
+            _files.copy(pathlib.Path(source["folder"], name), self.site.folder / file)
 
     def _write_site(self, merged: Result, names: list[str]) -> None:
         number = len(self.site.sites) + 1

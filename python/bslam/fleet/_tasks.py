@@ -64,7 +64,10 @@ def program_hash() -> str:
 
 
 def make_map(setup: Setup, recording: str) -> Result:
-    """The map of a recording, with its hash as `map`, its trajectory and its sketch; or the `error`."""
+    """The map of a recording, with its hash as `map`, its trajectories and its sketch; or the `error`.
+
+    `parts` are the files of the trajectories in further submaps.
+    """
     setup.check()
     try:
         content = content_of(setup.cache, recording)
@@ -90,7 +93,8 @@ def make_map(setup: Setup, recording: str) -> Result:
                 return {"error": "no frame could be tracked"}
             if done.returncode != 0:
                 raise _bslam.Error(_message(done))
-            for name in ("trajectory.tum", "summary.json"):
+            parts = sorted((f.name for f in run.glob("trajectory_part*.tum")), key=lambda name: (len(name), name))
+            for name in ("trajectory.tum", *parts, "summary.json"):
                 shutil.copy(run / name, folder)
         made = _bslam.Map.load(folder / "map.bmap")
         np.save(folder / "sketch.npy", sketch(made.words()))
@@ -99,6 +103,7 @@ def make_map(setup: Setup, recording: str) -> Result:
             "keyframes": made.num_keyframes,
             "landmarks": made.num_landmarks,
             "scale": made.scale,
+            "parts": parts,
         }
 
     try:
@@ -150,19 +155,46 @@ def merge(setup: Setup, maps: list[Result], final: bool = False) -> Result:
 
 
 def transfer(setup: Setup, own: Result, site: Result) -> Result:
-    """The trajectory of a recording in the map of a site; `joined` if it is in the first submap."""
+    """The trajectory of a recording in the map of a site; `joined` if it is in the first submap.
+
+    Those in further submaps of its own map are added to it if they are there as well; the others are the `parts`.
+    """
     setup.check()
 
     def make(folder: pathlib.Path) -> Result:
-        file = folder / "trajectory.tum"
-        trajectory = pathlib.Path(own["folder"], "trajectory.tum")
-        run_program(
-            "map", "transfer", str(trajectory), f"--from={_map_of(own)}", f"--to={_map_of(site)}", f"--out={file}"
-        )
-        with file.open() as lines:
-            return {"joined": " parent=world " in lines.readline()}
+        joined = _move("trajectory.tum", own, site, folder)
+        added = [name for name in own["parts"] if _move_part(name, own, site, folder)]
+        if joined:
+            _add_poses(folder / "trajectory.tum", [folder / name for name in added])
+        return {"joined": joined, "parts": [name for name in own["parts"] if name not in added]}
 
     return cached(setup.cache, "trajectories", [setup.program, own["map"], site["map"]], make)
+
+
+def _move(name: str, own: Result, site: Result, folder: pathlib.Path) -> bool:
+    """Writes a trajectory of a recording in the map of a site. Returns whether it is in the first submap."""
+    given, file = pathlib.Path(own["folder"], name), folder / name
+    run_program("map", "transfer", str(given), f"--from={_map_of(own)}", f"--to={_map_of(site)}", f"--out={file}")
+    with file.open() as lines:
+        return " parent=world " in lines.readline()
+
+
+def _move_part(name: str, own: Result, site: Result, folder: pathlib.Path) -> bool:
+    try:
+        return _move(name, own, site, folder)
+    except RefusedError:  # too few keyframes to know its place, so that it remains where it was
+        shutil.copy(pathlib.Path(own["folder"], name), folder)
+        return False
+
+
+def _add_poses(trajectory: pathlib.Path, parts: Sequence[pathlib.Path]) -> None:
+    """Adds the poses of other files, in order of time."""
+    comments = [line for line in trajectory.read_text().splitlines() if line.startswith("#")]
+    poses = [
+        line for file in (trajectory, *parts) for line in file.read_text().splitlines() if not line.startswith("#")
+    ]
+    poses.sort(key=lambda line: float(line.split()[0]))
+    trajectory.write_text("\n".join([*comments, *poses]) + "\n")
 
 
 def _map_of(result: Result) -> str:
