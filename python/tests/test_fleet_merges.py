@@ -44,12 +44,14 @@ class Program:
             "inputs": [{"file": file, "joined": True, "reason": ""} for file in files],
             "scales": [],
         }
-        return subprocess.CompletedProcess(arguments, 0, json.dumps(answer), "")
+        warnings = [f"warning: {file}: the calibration is contradicted" for file in files]
+        warnings += [f"warning: the scales of {files[0]} and {file} disagree" for file in files[1:]]
+        return subprocess.CompletedProcess(arguments, 0, json.dumps(answer), "\n".join(warnings) + "\n")
 
 
 @pytest.fixture
 def merge(client, tmp_path, monkeypatch):
-    """The sites of recordings that look alike, as lists of their names, and why recordings are apart."""
+    """The sites of recordings that look alike, as lists of their names, why recordings are apart, and the warnings."""
 
     def merged(names, program):
         monkeypatch.setattr(_tasks, "_run", program)
@@ -75,7 +77,7 @@ def merge(client, tmp_path, monkeypatch):
         monkeypatch.setattr(mapping, "_write", sites.extend)
         mapping.run([Recording(name, name) for name in names])
         lists = [sorted(recording.name for recording, _ in members) for _, members in sites]
-        return lists, {name: mapping.reasons.get(key, "") for key, name in maps.items()}
+        return lists, {name: mapping.reasons.get(key, "") for key, name in maps.items()}, mapping.site.warnings
 
     return merged
 
@@ -85,7 +87,7 @@ def test_maps_with_common_keyframes_are_not_in_one_site(merge):
         both = {"monday", "monday_partial"} <= set(recordings)
         return "keyframes: found 4 of 5 in another map as well, expected maps without common keyframes" if both else ""
 
-    sites, reasons = merge(["monday", "monday_partial", "tuesday"], Program(refusal))
+    sites, reasons, _ = merge(["monday", "monday_partial", "tuesday"], Program(refusal))
     assert sorted(map(len, sites)) == [1, 2]
     assert not any({"monday", "monday_partial"} <= set(site) for site in sites)
     (apart,) = next(site for site in sites if len(site) == 1)
@@ -99,12 +101,19 @@ def test_maps_with_common_keyframes_are_not_in_one_site(merge):
 def test_sites_do_not_grow_beyond_what_can_be_merged(merge, most):
     program = Program(lambda recordings: "rig: found 104 cameras, expected fewer" if len(recordings) > most else "")
     names = [f"r{i}" for i in range(9)]
-    sites, _ = merge(names, program)
+    sites, _, warnings = merge(names, program)
     assert sorted(name for site in sites for name in site) == names
     assert all(1 <= len(site) <= most for site in sites)
     assert sum(len(site) > 1 for site in sites) > 0
     for site in sites:
         assert len(site) == 1 or site in program.merged
+    assert any(w.startswith("not merged: ") and w.endswith("rig: found 104 cameras, expected fewer") for w in warnings)
+
+
+def test_warnings_of_merges_name_recordings(merge):
+    """Those of the maps themselves are warnings of their runs."""
+    _, _, warnings = merge(["monday", "tuesday"], Program())
+    assert warnings in (["the scales of monday and tuesday disagree"], ["the scales of tuesday and monday disagree"])
 
 
 def tum(parent, *times):
@@ -144,3 +153,36 @@ def test_poses_of_further_submaps_are_kept(tmp_path, monkeypatch):
     assert (folder / "trajectory.tum").read_text() == tum("world", 10.5, 14.5, 15.5, 20.25)
     for part in moved["parts"]:
         assert (folder / part).read_text() == given[part]
+
+
+class EmptyMap:
+    """What make_map asks of the map of a run."""
+
+    num_keyframes, num_landmarks, scale = 1, 10, "metric"
+
+    @classmethod
+    def load(cls, _):
+        return cls()
+
+    def words(self):
+        return []
+
+
+def test_warnings_of_runs_name_the_recording(tmp_path, monkeypatch):
+    def program(*arguments):
+        data, out, saved, *_ = (a.rpartition("=")[2] for a in arguments[1:])
+        pathlib.Path(out).mkdir()
+        for file in (f"{out}/trajectory.tum", f"{out}/summary.json", saved):
+            pathlib.Path(file).write_text("a result")
+        warnings = f"warning: {data}: images are missing\nwarning: test it (bslam rig info --images {data})\n"
+        return subprocess.CompletedProcess(arguments, 0, "", "a note\n" + warnings)
+
+    monkeypatch.setattr(_tasks, "_run", program)
+    monkeypatch.setattr(_tasks._bslam, "Map", EmptyMap)
+    setup = _tasks.Setup(str(tmp_path / "cache"), _tasks.program_hash())
+    for name in ("first", "copy"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "image.png").write_text("the same")
+        made = _tasks.make_map(setup, str(tmp_path / name))
+        assert made["computed"] == (name == "first")
+        assert made["warnings"] == ["images are missing", f"test it (bslam rig info --images {tmp_path / name})"]

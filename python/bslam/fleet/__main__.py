@@ -56,6 +56,8 @@ def _map(recordings: list[str], out: str, **options: Any) -> int:
     from ._site import map_recordings
 
     site = map_recordings(recordings, out, progress=True, **options)
+    for warning in site.warnings:
+        print(f"warning: {warning}", file=sys.stderr)
     print("\n".join(site.lines()))
     return 0 if site.sites else 3
 

@@ -64,6 +64,7 @@ class Site:
         sites: the maps of two or more recordings, the one with most recordings first; keys: map, recordings,
             keyframes, landmarks.
         recordings: all recordings, in order of name.
+        warnings: what is wrong with recordings or their maps; each begins with the name of a recording, or names it.
         computed: number of tasks that were computed.
         reused: number of tasks whose results were already in the cache.
     """
@@ -71,6 +72,7 @@ class Site:
     folder: pathlib.Path
     sites: list[dict[str, Any]] = field(default_factory=list)
     recordings: list[Recording] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
     computed: int = 0
     reused: int = 0
 
@@ -229,6 +231,7 @@ class _Mapping:
         made = self._done("maps", [self._submit(_tasks.make_map, r.data) for r in recordings])
         groups: dict[str, list[tuple[Recording, Result]]] = {}  # recordings with the same map, by its hash
         for recording, result in zip(recordings, made, strict=True):
+            self.site.warnings += [f"{recording.name}: {warning}" for warning in result.get("warnings", [])]
             if "error" in result:
                 recording.state, recording.reason = "failed", result["error"]
             else:
@@ -270,10 +273,12 @@ class _Mapping:
         while True:
             merged, merges = self._rounds(pairs, maps)
             refused = len(self.refused)
-            for members, result in zip(merges, self._done("merging", list(merges.values())), strict=True):
+            results = self._done("merging", list(merges.values()))
+            for members, result in zip(merges, results, strict=True):
                 self._note_merge(members, result)
             if len(self.refused) == refused:
                 break
+        self.site.warnings += [self._with_names(warning) for result in results for warning in result["warnings"]]
         final = {members: self._submit(_tasks.merge, [merged[members]], True) for members in merged if len(members) > 1}
         merged.update(zip(final, self._done("adjusting", list(final.values())), strict=True))
         return sorted(((m, k) for k, m in merged.items()), key=lambda s: (-len(s[1]), -s[0]["keyframes"], s[1]))
@@ -283,6 +288,7 @@ class _Mapping:
             self.names[result["map"]] = f"{self.names[members[0]]} and {len(members) - 1} more"
         elif result["error"]:
             self._refuse(members, result["error"])
+            self.site.warnings.append(f"not merged: {self._with_names(result['error'])}")
 
     def _refuse(self, members: Sequence[str], reason: str) -> None:
         self.refused.append(frozenset(members))
@@ -366,7 +372,12 @@ class _Mapping:
         return self.reasons.get(key, "no place looks like one of another recording")
 
     def _write_summary(self) -> None:
-        now = {"schema": 1, "sites": self.site.sites, "recordings": [vars(r) for r in self.site.recordings]}
+        now = {
+            "schema": 1,
+            "sites": self.site.sites,
+            "recordings": [vars(r) for r in self.site.recordings],
+            "warnings": self.site.warnings,
+        }
         text = json.dumps(now, indent=1) + "\n"
         _files.write(self.site.folder / "site.json", lambda file: file.write_text(text))
         for name in self.earlier - _files.files_of(now):

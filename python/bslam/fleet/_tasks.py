@@ -11,7 +11,7 @@ import shutil
 import signal
 import subprocess
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -66,7 +66,7 @@ def program_hash() -> str:
 def make_map(setup: Setup, recording: str) -> Result:
     """The map of a recording, with its hash as `map`, its trajectories and its sketch; or the `error`.
 
-    `parts` are the files of the trajectories in further submaps.
+    `parts` are the files of the trajectories in further submaps, and `warnings` those of the run.
     """
     setup.check()
     try:
@@ -77,6 +77,8 @@ def make_map(setup: Setup, recording: str) -> Result:
     def make(folder: pathlib.Path) -> Result:
         with tempfile.TemporaryDirectory() as work:
             data, run = local_copy(recording, pathlib.Path(work)), pathlib.Path(work, "run")
+            # The same for all recordings with this content.
+            neutral = functools.partial(_replaced, {f"{data}: ": "", data: content, f"{run}/": ""})
             done = _run(
                 "run",
                 data,
@@ -90,7 +92,7 @@ def make_map(setup: Setup, recording: str) -> Result:
                 *setup.settings,
             )
             if done.returncode == _NOTHING_TRACKED:
-                return {"error": "no frame could be tracked"}
+                return {"error": "no frame could be tracked", "warnings": [*map(neutral, _warnings(done))]}
             if done.returncode != 0:
                 raise _bslam.Error(_message(done))
             parts = sorted((f.name for f in run.glob("trajectory_part*.tum")), key=lambda name: (len(name), name))
@@ -104,12 +106,14 @@ def make_map(setup: Setup, recording: str) -> Result:
             "landmarks": made.num_landmarks,
             "scale": made.scale,
             "parts": parts,
+            "warnings": [*map(neutral, _warnings(done))],
         }
 
     try:
-        return cached(setup.cache, "maps", [setup.program, setup.run, setup.settings, content], make)
+        result = cached(setup.cache, "maps", [setup.program, setup.run, setup.settings, content], make)
     except _bslam.Error as error:
         return {"error": str(error), "computed": True}
+    return {**result, "warnings": [w.replace(content, recording) for w in result["warnings"]]}
 
 
 def compare(setup: Setup, a: Result, b: Result) -> Result:
@@ -134,6 +138,7 @@ def merge(setup: Setup, maps: list[Result], final: bool = False) -> Result:
     """The merged map, with a global bundle adjustment if it is the `final` one.
 
     If the maps cannot be in one map, the result is the `error`, which is empty if it is that of one of the maps.
+    `warnings` are about the maps together. Texts name maps by their hashes.
     """
     setup.check()
     if any("error" in m for m in maps):
@@ -141,9 +146,12 @@ def merge(setup: Setup, maps: list[Result], final: bool = False) -> Result:
 
     def make(folder: pathlib.Path) -> Result:
         options = ["--json", f"--out={folder}/map.bmap", *setup.settings, *([] if final else ["--no-final-ba"])]
-        merged = json.loads(run_program("map", "merge", *map(_map_of, maps), *options))
+        done = _checked("map", "merge", *map(_map_of, maps), *options)
+        merged = json.loads(done.stdout)
+        of_inputs = tuple(f"{_map_of(m)}: " for m in maps)
+        warnings = [_by_hash(w, maps) for w in _warnings(done) if not w.startswith(of_inputs)]
         numbers = {name: merged[name] for name in ("keyframes", "landmarks", "submaps")}
-        return {"map": sha256_of(folder / "map.bmap"), **numbers}
+        return {"map": sha256_of(folder / "map.bmap"), **numbers, "warnings": warnings}
 
     inputs = sorted(m["map"] for m in maps)
     try:
@@ -203,16 +211,24 @@ def _map_of(result: Result) -> str:
 
 def _by_hash(text: str, maps: Sequence[Result]) -> str:
     """The text with hashes of maps instead of their files."""
-    for m in maps:
-        text = text.replace(_map_of(m), m["map"])
+    return _replaced({_map_of(m): m["map"] for m in maps}, text)
+
+
+def _replaced(names: Mapping[str, str], text: str) -> str:
+    for name, other in names.items():
+        text = text.replace(name, other)
     return text
 
 
 def run_program(*arguments: str) -> str:
     """Runs the program and returns what it prints."""
+    return _checked(*arguments).stdout
+
+
+def _checked(*arguments: str) -> subprocess.CompletedProcess[str]:
     done = _run(*arguments)
     if done.returncode == 0:
-        return done.stdout
+        return done
     message = _message(done)
     refused = done.returncode == _WRONG_INPUT and ", expected " in message  # unlike a file that cannot be written
     raise (RefusedError if refused else _bslam.Error)(message)
@@ -231,6 +247,11 @@ def _run(*arguments: str) -> subprocess.CompletedProcess[str]:
     if done.returncode < 0:  # Dask tries again
         raise ProgramKilledError(f"bslam {arguments[0]} was ended by signal {-done.returncode}")
     return done
+
+
+def _warnings(done: subprocess.CompletedProcess[str]) -> list[str]:
+    mark = "warning: "
+    return [line.removeprefix(mark) for line in done.stderr.splitlines() if line.startswith(mark)]
 
 
 def _message(done: subprocess.CompletedProcess[str]) -> str:
