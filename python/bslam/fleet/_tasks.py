@@ -35,7 +35,7 @@ class RefusedError(_bslam.Error):
 def reason_of(error: Exception) -> str:
     """The reason of the system, and the file that it concerns; or the text of the error."""
     if not isinstance(error, OSError) or error.strerror is None:
-        return str(error)
+        return str(error) or type(error).__name__
     return error.strerror if error.filename is None else f"{error.filename}: {error.strerror}"
 
 
@@ -71,12 +71,14 @@ def make_map(setup: Setup, recording: str) -> Result:
     setup.check()
     try:
         content = content_of(setup.cache, recording)
-    except (OSError, ValueError, ImportError) as error:  # the last two: an address that fsspec cannot use here
+    except Exception as error:  # each store has errors of its own
+        if "://" not in recording and not isinstance(error, (OSError, ValueError, ImportError)):
+            raise
         return {"error": f"cannot open {recording}: {reason_of(error)}", "computed": False}
 
     def make(folder: pathlib.Path) -> Result:
         with tempfile.TemporaryDirectory() as work:
-            data, run = local_copy(recording, pathlib.Path(work)), pathlib.Path(work, "run")
+            data, run = _fetched(recording, pathlib.Path(work)), pathlib.Path(work, "run")
             # The same for all recordings with this content.
             neutral = functools.partial(_replaced, {f"{data}: ": "", data: content, f"{run}/": ""})
             done = _run(
@@ -114,6 +116,14 @@ def make_map(setup: Setup, recording: str) -> Result:
     except _bslam.Error as error:
         return {"error": str(error), "computed": True}
     return {**result, "warnings": [w.replace(content, recording) for w in result["warnings"]]}
+
+
+def _fetched(recording: str, folder: pathlib.Path) -> str:
+    """The path of a recording, which may be in `folder`. An error of its store is one of the recording."""
+    try:
+        return local_copy(recording, folder)
+    except Exception as error:
+        raise _bslam.Error(f"cannot read {recording}: {reason_of(error)}") from error
 
 
 def compare(setup: Setup, a: Result, b: Result) -> Result:
