@@ -1,11 +1,15 @@
 """The cache, and recordings in stores, as workers use them."""
 
+import os
+import pathlib
+
 import fsspec
 import pytest
 
 pytest.importorskip("distributed", reason="distributed is not installed: the fleet is not tested")
 
 from bslam.fleet import _tasks
+from bslam.fleet._cache import cached
 from fsspec import AbstractFileSystem
 from fsspec.registry import _registry
 
@@ -71,3 +75,37 @@ def test_recording_that_can_only_be_listed_is_failed(store, tmp_path):
     store("listed", reading_error=PermissionError(13, "Permission denied"))
     error = made_map(tmp_path, "listed://bucket/monday")["error"]
     assert error == "cannot read listed://bucket/monday: Permission denied"
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]"])
+def test_damaged_result_is_made_again(tmp_path, text):
+    def make(folder):
+        (folder / "more.txt").write_text("new")
+        return {"number": 1}
+
+    folder = pathlib.Path(cached(str(tmp_path), "stage", 1, make)["folder"])
+    (folder / "result.json").write_text(text)
+    (folder / "more.txt").write_text("")
+    again = cached(str(tmp_path), "stage", 1, make)
+    assert (again["computed"], again["number"], again["folder"]) == (True, 1, str(folder))
+    assert (folder / "more.txt").read_text() == "new"
+    assert not cached(str(tmp_path), "stage", 1, make)["computed"]
+    assert [f.name for f in (tmp_path / "stage").iterdir()] == [folder.name]
+
+
+def test_results_are_on_the_disk_before_they_have_their_name(tmp_path, monkeypatch):
+    flushed, renamed = set(), []
+    flush, rename = os.fsync, pathlib.Path.rename
+
+    def note_flush(descriptor):
+        flushed.add(os.fstat(descriptor).st_ino)
+        flush(descriptor)
+
+    def note_rename(path, target):
+        renamed.append([p.name for p in (path, *path.iterdir()) if p.stat().st_ino not in flushed])
+        return rename(path, target)
+
+    monkeypatch.setattr(os, "fsync", note_flush)
+    monkeypatch.setattr(pathlib.Path, "rename", note_rename)
+    cached(str(tmp_path), "stage", 1, lambda folder: {"size": (folder / "map.bmap").write_text("map")})
+    assert renamed == [[]]

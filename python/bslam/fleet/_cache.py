@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import os
@@ -33,23 +34,51 @@ def key_of(value: Any) -> str:
 def cached(cache: str, stage: str, depends_on: Any, make: Callable[[pathlib.Path], Result]) -> Result:
     """The result of `make`, which writes files into the folder it is given, or that of an earlier call.
 
-    The folder is renamed to its final name when it is complete. `folder` and `computed` are added to the result.
+    The folder is renamed to its final name when it is complete and on the disk. One that cannot be read is replaced.
+    `folder` and `computed` are added to the result.
     """
     folder = pathlib.Path(cache, stage, key_of([stage, depends_on]))
-    computed = not folder.exists()
-    if computed:
+    result = _result_in(folder)
+    computed = result is None
+    if result is None:
         folder.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".", dir=folder.parent, ignore_cleanup_errors=True) as work:
             made = pathlib.Path(work, "made")
             made.mkdir()
             (made / "result.json").write_text(json.dumps(make(made)))
+            _flush(made)
+            if _result_in(folder) is None:
+                with contextlib.suppress(FileNotFoundError):
+                    folder.rename(pathlib.Path(work, "damaged"))
             try:
                 made.rename(folder)
             except OSError:  # another worker was faster
                 if not folder.exists():
                     raise
-    result = json.loads((folder / "result.json").read_text())
+        result = json.loads((folder / "result.json").read_bytes())
     return {**result, "folder": str(folder), "computed": computed}
+
+
+def _result_in(folder: pathlib.Path) -> Result | None:
+    """The result in a folder; None if there is none, or a computer that failed has not written all of it."""
+    try:
+        result = json.loads((folder / "result.json").read_bytes())
+    except (FileNotFoundError, NotADirectoryError, ValueError):
+        return None
+    return result if isinstance(result, dict) else None
+
+
+def _flush(folder: pathlib.Path) -> None:
+    """Writes the files in a folder, and their names, to the disk."""
+    for path in (*folder.iterdir(), folder):
+        descriptor = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        except OSError:
+            if path != folder:  # some network file systems cannot do it for folders
+                raise
+        finally:
+            os.close(descriptor)
 
 
 def content_of(cache: str, recording: str) -> str:
