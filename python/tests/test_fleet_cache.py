@@ -1,5 +1,7 @@
 """The cache, and recordings in stores, as workers use them."""
 
+import functools
+import io
 import os
 import pathlib
 
@@ -9,7 +11,7 @@ import pytest
 pytest.importorskip("distributed", reason="distributed is not installed: the fleet is not tested")
 
 from bslam.fleet import _tasks
-from bslam.fleet._cache import cached
+from bslam.fleet._cache import cached, content_of
 from fsspec import AbstractFileSystem
 from fsspec.registry import _registry
 
@@ -37,8 +39,8 @@ class Store(AbstractFileSystem):
     def get(self, *_, **__):
         raise self.reading_error
 
-    def open(self, path, *_, **__):
-        return fsspec.filesystem("memory").open(path)
+    def open(self, *_, **__):
+        return io.BytesIO(self.content)
 
 
 @pytest.fixture
@@ -109,3 +111,22 @@ def test_results_are_on_the_disk_before_they_have_their_name(tmp_path, monkeypat
     monkeypatch.setattr(pathlib.Path, "rename", note_rename)
     cached(str(tmp_path), "stage", 1, lambda folder: {"size": (folder / "map.bmap").write_text("map")})
     assert renamed == [[]]
+
+
+@pytest.mark.parametrize("key", ["ETag", "Content-MD5", "Digest", "Last-Modified"])
+def test_changed_file_of_a_web_server_is_noticed_by_its_header(store, tmp_path, key):
+    made = store(("http", "https"), header={key: "one"})
+    content = functools.partial(content_of, str(tmp_path), "https://host/monday.bag")
+    before = content()
+    assert content() == before
+    made.header = {key: "two"}
+    assert content() != before
+
+
+def test_file_of_a_web_server_that_sends_no_header_is_read(store, tmp_path):
+    made = store(("http", "https"), content=b"one")
+    content = functools.partial(content_of, str(tmp_path), "https://host/monday.bag")
+    before = content()
+    assert content() == before
+    made.content = b"two"
+    assert content() != before

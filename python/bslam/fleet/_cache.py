@@ -9,7 +9,7 @@ import os
 import pathlib
 import tempfile
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import IO, Any
 
 import fsspec
 from fsspec.implementations.local import LocalFileSystem
@@ -20,9 +20,13 @@ Result = dict[str, Any]
 def sha256_of(file: str | os.PathLike[str]) -> str:
     """Hash of the content of a file."""
     with open(file, "rb") as stream:
-        digest = hashlib.sha256()
-        while block := stream.read(1 << 20):
-            digest.update(block)
+        return _sha256_in(stream)
+
+
+def _sha256_in(stream: IO[bytes]) -> str:
+    digest = hashlib.sha256()
+    while block := stream.read(1 << 20):
+        digest.update(block)
     return digest.hexdigest()
 
 
@@ -85,14 +89,14 @@ def content_of(cache: str, recording: str) -> str:
     """Hash of the content of a recording.
 
     Files on disk are only read again if a size or modification time has changed. In object stores, the listing
-    identifies the content.
+    identifies the content; on web servers the header of the answer, or else the content itself.
     """
     system, root = fsspec.url_to_fs(recording)
     local = isinstance(system, LocalFileSystem)
     files = sorted(_files_below(root) if local else system.find(root))
     if not files:
         raise FileNotFoundError("No such file or directory")
-    listing = [(os.path.relpath(f, root), *(_stat(f) if local else [system.ukey(f)])) for f in files]
+    listing = [(os.path.relpath(f, root), *(_stat(f) if local else [_version(system, f)])) for f in files]
     if not local:
         return key_of(listing)
     return cached(
@@ -121,6 +125,18 @@ def _files_below(path: str, above: tuple[str, ...] = ()) -> Iterator[str]:
     elif place not in above:
         for name in os.listdir(path):
             yield from _files_below(os.path.join(path, name), (*above, place))
+
+
+def _version(system: fsspec.AbstractFileSystem, file: str) -> Any:
+    """What changes with the content of a file in a store."""
+    if "http" not in system.protocol:
+        return system.ukey(file)
+    info = system.info(file)  # ukey is the same for any content
+    header = {key: info[key] for key in ("ETag", "Content-MD5", "Digest", "Last-Modified") if info.get(key)}
+    if header:
+        return [header, info.get("size")]
+    with system.open(file) as stream:
+        return _sha256_in(stream)
 
 
 def _stat(file: str) -> list[int]:
