@@ -4,12 +4,13 @@ import json
 import pathlib
 import subprocess
 
+import bslam
 import numpy as np
 import pytest
 
 pytest.importorskip("distributed", reason="distributed is not installed: the fleet is not tested")
 
-from bslam.fleet import _tasks
+from bslam.fleet import _tasks, map_recordings
 from bslam.fleet._cache import sha256_of
 from bslam.fleet._site import Recording, _Mapping
 from distributed import Client
@@ -168,14 +169,22 @@ class EmptyMap:
         return []
 
 
+def run_of_nothing(*arguments):
+    """Writes the files of a run."""
+    out, saved = (a.rpartition("=")[2] for a in arguments[2:4])
+    pathlib.Path(out).mkdir()
+    for file in (f"{out}/trajectory.tum", f"{out}/summary.json", saved):
+        pathlib.Path(file).write_text("a result")
+    return subprocess.CompletedProcess(arguments, 0, "", "")
+
+
 def test_warnings_of_runs_name_the_recording(tmp_path, monkeypatch):
     def program(*arguments):
-        data, out, saved, *_ = (a.rpartition("=")[2] for a in arguments[1:])
-        pathlib.Path(out).mkdir()
-        for file in (f"{out}/trajectory.tum", f"{out}/summary.json", saved):
-            pathlib.Path(file).write_text("a result")
-        warnings = f"warning: {data}: images are missing\nwarning: test it (bslam rig info --images {data})\n"
-        return subprocess.CompletedProcess(arguments, 0, "", "a note\n" + warnings)
+        done, data = run_of_nothing(*arguments), arguments[1]
+        done.stderr = (
+            f"a note\nwarning: {data}: images are missing\nwarning: test it (bslam rig info --images {data})\n"
+        )
+        return done
 
     monkeypatch.setattr(_tasks, "_run", program)
     monkeypatch.setattr(_tasks._bslam, "Map", EmptyMap)
@@ -186,3 +195,19 @@ def test_warnings_of_runs_name_the_recording(tmp_path, monkeypatch):
         made = _tasks.make_map(setup, str(tmp_path / name))
         assert made["computed"] == (name == "first")
         assert made["warnings"] == ["images are missing", f"test it (bslam rig info --images {tmp_path / name})"]
+
+
+def test_call_after_a_repair_does_not_get_the_error_before_it(client, tmp_path, monkeypatch):
+    monkeypatch.setattr(_tasks, "_run", run_of_nothing)
+    monkeypatch.setattr(_tasks._bslam, "Map", EmptyMap)
+    (tmp_path / "monday").mkdir()
+    (tmp_path / "monday/image.png").write_text("an image")
+    blocked = tmp_path / "cache/maps"
+    blocked.parent.mkdir()
+    blocked.write_text("not a folder")
+    with pytest.raises(bslam.Error, match="cache/maps") as failed:
+        map_recordings([tmp_path / "monday"], tmp_path / "site", client=client, cache=blocked.parent)
+    blocked.unlink()
+    site = map_recordings([tmp_path / "monday"], tmp_path / "site", client=client, cache=blocked.parent)
+    assert [r.state for r in site.recordings] == ["apart"]
+    assert failed  # Dask keeps what an exception refers to

@@ -244,7 +244,8 @@ class _Mapping:
         return self.site
 
     def _submit(self, task: Any, *arguments: Any) -> Future:
-        return self.client.submit(task, self.setup, *arguments, retries=2)
+        # Not pure: Dask would give the error of an earlier call, whose cause may have been mended, once more.
+        return self.client.submit(task, self.setup, *arguments, retries=2, pure=False)
 
     def _done(self, label: str, futures: list[Future]) -> list[Result]:
         file = sys.stderr if self.progress and futures else io.StringIO()
