@@ -5,12 +5,13 @@ import io
 import os
 import pathlib
 
+import bslam
 import fsspec
 import pytest
 
 pytest.importorskip("distributed", reason="distributed is not installed: the fleet is not tested")
 
-from bslam.fleet import _tasks
+from bslam.fleet import _files, _tasks
 from bslam.fleet._cache import cached, content_of
 from fsspec import AbstractFileSystem
 from fsspec.registry import _registry
@@ -130,3 +131,37 @@ def test_file_of_a_web_server_that_sends_no_header_is_read(store, tmp_path):
     assert content() == before
     made.content = b"two"
     assert content() != before
+
+
+def test_files_that_are_written_at_once_are_whole(tmp_path):
+    """Two commands that write the same file do not share an unfinished one."""
+    file = tmp_path / "rig.yaml"
+
+    def outer(unfinished):
+        unfinished.write_text("first")
+        _files.write(file, lambda other: other.write_text("second"))
+        assert file.read_text() == "second"
+        assert unfinished.read_text() == "first"
+
+    _files.write(file, outer)
+    assert file.read_text() == "first"
+    assert [f.name for f in tmp_path.iterdir()] == ["rig.yaml"]
+
+
+def test_unfinished_files_are_removed(tmp_path):
+    def interrupted(unfinished):
+        unfinished.write_text("half")
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        _files.write(tmp_path / "rig.yaml", interrupted)
+    assert not list(tmp_path.iterdir())
+
+
+def test_folder_with_a_cache_and_other_files_is_not_replaced(tmp_path):
+    (tmp_path / "cache").mkdir()
+    assert _files.open_results(tmp_path, False) == set()
+    (tmp_path / "site.bmap").write_text("mine")
+    with pytest.raises(bslam.Error, match="--out: found a folder that is not empty"):
+        _files.open_results(tmp_path, False)
+    assert _files.open_results(tmp_path, True) == set()

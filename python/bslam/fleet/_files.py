@@ -65,7 +65,7 @@ def open_results(out: pathlib.Path, overwrite: bool) -> set[str]:
     """Creates the folder of the results and returns the files of an earlier result in it, relative to the folder."""
     make_folder(out, "--out")
     there = set(os.listdir(out))
-    if there and not overwrite and not there & {"site.json", "cache"}:
+    if "site.json" not in there and there - {"cache"} and not overwrite:
         raise _bslam.Error(
             f"{out}: --out: found a folder that is not empty, expected an empty or new folder, or --overwrite"
         )
@@ -114,10 +114,11 @@ def copy(source: Path, file: pathlib.Path) -> None:
 
 def write(file: pathlib.Path, make: Callable[[pathlib.Path], Any]) -> None:
     """Writes a file by `make`, under its name when it is complete."""
-    unfinished = file.with_name(f".{file.name}")
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
-        make(unfinished)
-        unfinished.replace(file)
+        with tempfile.TemporaryDirectory(prefix=".", dir=file.parent, ignore_cleanup_errors=True) as work:
+            unfinished = pathlib.Path(work, file.name)
+            make(unfinished)
+            unfinished.replace(file)
     except OSError as error:
         raise _bslam.Error(f"cannot write {file}: {error.strerror}") from error

@@ -336,6 +336,8 @@ class _Mapping:
                     self.reasons.setdefault(key, verdict["reason"])
 
     def _write(self, sites: list[tuple[Result, list[tuple[Recording, Result]]]]) -> None:
+        if not (self.site.folder / "site.json").exists():
+            self._write_json({"schema": 1, "sites": [], "recordings": [], "warnings": []})  # by which it is known again
         shared = [(merged, r, own) for merged, members in sites if len(members) > 1 for r, own in members]
         moved = self._done("trajectories", [self._submit(_tasks.transfer, own, merged) for merged, _, own in shared])
         trajectories = {r.name: m for (_, r, _), m in zip(shared, moved, strict=True)}
@@ -379,10 +381,13 @@ class _Mapping:
             "recordings": [vars(r) for r in self.site.recordings],
             "warnings": self.site.warnings,
         }
-        text = json.dumps(now, indent=1) + "\n"
-        _files.write(self.site.folder / "site.json", lambda file: file.write_text(text))
+        self._write_json(now)
         for name in self.earlier - _files.files_of(now):
             (self.site.folder / name).unlink(missing_ok=True)
+
+    def _write_json(self, summary: dict[str, Any]) -> None:
+        text = json.dumps(summary, indent=1) + "\n"
+        _files.write(self.site.folder / "site.json", lambda file: file.write_text(text))
 
 
 def _sketch_in(folder: pathlib.Path) -> np.ndarray[Any, Any]:
