@@ -166,8 +166,7 @@ class Client:
         kind = http.client.HTTPSConnection if self._encrypted else http.client.HTTPConnection
         connection = kind(self._host, self._port, timeout=self._timeout)
         try:
-            connection.request(method, self._folder + path, body, {**self._headers, **(headers or {})})
-            response = connection.getresponse()
+            response = _response(connection, method, self._folder + path, body, {**self._headers, **(headers or {})})
             answer = response.read()
         except (OSError, http.client.HTTPException) as error:
             raise ServiceError(f"{self._address}: {error}") from error
@@ -176,6 +175,20 @@ class Client:
         if response.status == 200:
             return answer
         raise ServiceError(_reason(answer), response.status, _seconds_until(response.getheader("Retry-After")))
+
+
+def _response(
+    connection: http.client.HTTPConnection, method: str, path: str, body: bytes, headers: Mapping[str, str]
+) -> http.client.HTTPResponse:
+    try:
+        connection.request(method, path, body, headers)
+    except (BrokenPipeError, ConnectionResetError) as error:
+        # A server that refuses a request answers before it has read the body, and does not wait for the end of it.
+        try:
+            return connection.getresponse()
+        except (OSError, http.client.HTTPException):
+            raise error from None
+    return connection.getresponse()
 
 
 def _seconds_until(retry_after: str | None) -> float | None:

@@ -2,6 +2,7 @@ import http.client
 import http.server
 import json
 import shutil
+import socket
 import ssl
 import subprocess
 import threading
@@ -113,6 +114,28 @@ def test_the_time_to_retry_may_be_a_date_and_need_not_be_understood(other):
     assert retry_after("soon") == 2
     assert retry_after("odd") is None
     assert retry_after("never") is None
+
+
+def test_a_refusal_before_the_end_of_the_request_is_that_of_the_server():
+    """The server answers after the header, and closes the connection while the images are being sent."""
+
+    def refuse(listener):
+        connection, _ = listener.accept()
+        with connection:
+            received = b""
+            while b"\r\n\r\n" not in received:
+                received += connection.recv(1000)
+            connection.sendall(b"HTTP/1.1 503 Busy\r\nRetry-After: 2\r\nContent-Length: 4\r\n\r\nbusy")
+            connection.shutdown(socket.SHUT_WR)
+            connection.recv(1000)
+
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        thread = threading.Thread(target=refuse, args=[listener])
+        thread.start()
+        with pytest.raises(ServiceError, match="^busy$") as caught:
+            Client(f"127.0.0.1:{listener.getsockname()[1]}").localise({"cam0": bytes(30_000_000)})
+        thread.join()
+    assert (caught.value.status, caught.value.retry_after) == (503, 2)
 
 
 @pytest.mark.skipif(shutil.which("openssl") is None, reason="needs openssl for a certificate")
