@@ -1,8 +1,12 @@
 """How maps become sites, and trajectories those of sites, with programs that only note what they are asked for."""
 
+import io
 import json
 import pathlib
+import re
 import subprocess
+import sys
+import threading
 
 import bslam
 import numpy as np
@@ -10,10 +14,10 @@ import pytest
 
 pytest.importorskip("distributed", reason="distributed is not installed: the fleet is not tested")
 
-from bslam.fleet import _tasks, map_recordings
+from bslam.fleet import _site, _tasks, map_recordings
 from bslam.fleet._cache import sha256_of
 from bslam.fleet._site import Recording, _Mapping
-from distributed import Client
+from distributed import Client, LocalCluster
 
 
 @pytest.fixture(scope="module")
@@ -211,3 +215,57 @@ def test_call_after_a_repair_does_not_get_the_error_before_it(client, tmp_path, 
     site = map_recordings([tmp_path / "monday"], tmp_path / "site", client=client, cache=blocked.parent)
     assert [r.state for r in site.recordings] == ["apart"]
     assert failed  # Dask keeps what an exception refers to
+
+
+@pytest.mark.parametrize(
+    ("error", "reason"),
+    [
+        (ModuleNotFoundError("No module named 'bslam'"), "No module named 'bslam'"),
+        (
+            RuntimeError("Error during deserialization of the task graph."),
+            "Error during deserialization of the task graph.",
+        ),
+    ],
+)
+def test_scheduler_or_worker_without_the_package_is_named(client, tmp_path, monkeypatch, error, reason):
+    def fail(*_):
+        raise error
+
+    monkeypatch.setattr(_tasks, "make_map", fail)
+    (tmp_path / "monday").mkdir()
+    message = f"the scheduler or a worker does not have bslam ({reason}); install the same package on all of them"
+    with pytest.raises(bslam.Error, match=f"^{re.escape(message)}$"):
+        map_recordings([tmp_path / "monday"], tmp_path / "site", client=client)
+
+
+class Heard(io.StringIO):
+    """Counts the messages about missing workers."""
+
+    def __init__(self):
+        super().__init__()
+        self.messages = threading.Semaphore(0)
+
+    def write(self, text):
+        if text.startswith("no worker is connected to "):
+            self.messages.release()
+        return super().write(text)
+
+
+def test_scheduler_without_workers_is_named_also_later(monkeypatch):
+    looked, nthreads = threading.Semaphore(0), Client.nthreads
+
+    def look(client):
+        if found := nthreads(client):
+            looked.release()
+        return found
+
+    monkeypatch.setattr(_site, "_LOOK_S", 0.01)
+    monkeypatch.setattr(Client, "nthreads", look)
+    monkeypatch.setattr(sys, "stderr", heard := Heard())
+    cluster = LocalCluster(processes=False, n_workers=0, dashboard_address=None)
+    with cluster, _site._connected(None, cluster.scheduler_address, None, True):
+        assert heard.messages.acquire(timeout=60)
+        cluster.scale(1)
+        assert looked.acquire(timeout=60)
+        cluster.scale(0)
+        assert heard.messages.acquire(timeout=60)

@@ -11,6 +11,7 @@ import pathlib
 import re
 import signal
 import sys
+import threading
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from multiprocessing import resource_tracker
@@ -29,6 +30,7 @@ from ._sketch import likely_pairs
 
 _FAN_IN = 5  # maps that are merged at once
 _NUMBERS = ("keyframes", "landmarks")  # sizes of a map
+_LOOK_S = 10.0  # time between looks for workers
 _HASH = re.compile("[0-9a-f]{64}")
 
 
@@ -167,6 +169,8 @@ def _connected(client: Client | None, scheduler: str | None, workers: int | None
             client = _local_client(stack, workers) if scheduler is None else _client_of(stack, scheduler)
         if progress:
             print(f"dashboard: {client.dashboard_link or 'none'}", file=sys.stderr)
+            if scheduler is not None:
+                stack.enter_context(_watched(client, scheduler))
         yield client
     finally:
         with _interruption_later():
@@ -182,6 +186,30 @@ def _interruption_later() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextlib.contextmanager
+def _watched(client: Client, scheduler: str) -> Iterator[None]:
+    """Says it on stderr if there are no workers, also later: workers end if they cannot read a task."""
+    ended = threading.Event()
+
+    def watch() -> None:
+        workers = True
+        while not ended.is_set():
+            with contextlib.suppress(Exception):  # a lost scheduler is an error of the tasks
+                before, workers = workers, bool(client.nthreads())
+                if before and not workers:
+                    print(f"no worker is connected to {scheduler}: start some by dask worker", file=sys.stderr)
+            ended.wait(_LOOK_S)
+
+    with _interruption_later():
+        thread = threading.Thread(target=watch, daemon=True)
+        thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
 
 
 def _local_client(stack: contextlib.ExitStack, workers: int | None) -> Client:
@@ -260,6 +288,13 @@ class _Mapping:
             ) from error
         except (OSError, _tasks.ProgramKilledError) as error:
             raise _bslam.Error(f"{label}: {_tasks.reason_of(error)}; the same command continues") from error
+        except (ImportError, RuntimeError) as error:
+            if isinstance(error, RuntimeError) and "deserializ" not in str(error):
+                raise
+            raise _bslam.Error(
+                f"the scheduler or a worker does not have bslam ({error.__cause__ or error}); install the same package "
+                "on all of them"
+            ) from error
         computed = sum(r["computed"] for r in results)
         self.site.computed += computed
         self.site.reused += len(results) - computed
