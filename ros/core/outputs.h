@@ -56,7 +56,8 @@ struct Outputs {
   std::function<void(const PointCloud&)> cloud;
   std::function<void(const PathOutput&)> path;
   std::function<void(const std::vector<DiagnosticStatus>&)> diagnostics;  // immediately after a change of a state
-  std::function<bool()> wants_cloud, wants_path;                          // false: nobody has subscribed
+  std::function<std::size_t()> cloud_subscribers;                         // number; empty: one
+  std::function<bool()> wants_path;                                       // false: nobody has subscribed
   std::function<void(bslam::LogLevel, const std::string&)> log;
 };
 

@@ -207,8 +207,11 @@ void SlamRunner::report_changes(const std::optional<bslam::FrameResult>& before,
 
 // The landmarks of the submap of the present pose: those of other submaps are in frames that are unrelated to it.
 void SlamRunner::publish_cloud(const bslam::FrameResult& frame) {
+  if (!outputs_.cloud) return;
+  const std::size_t subscribers = outputs_.cloud_subscribers ? outputs_.cloud_subscribers() : 1;
+  if (subscribers > std::exchange(cloud_subscribers_, subscribers)) cloud_due_ = true;  // a new one has no points yet
   const bool early = cloud_published_ && frame.time_ns - cloud_ns_ < to_ns(parameters_.cloud_period);
-  if (!cloud_due_ || early || !outputs_.cloud || (outputs_.wants_cloud && !outputs_.wants_cloud())) return;
+  if (!cloud_due_ || early || subscribers == 0) return;
   cloud_due_ = false;
   cloud_published_ = true;
   cloud_ns_ = frame.time_ns;

@@ -97,8 +97,9 @@ class SlamRunner {
 
   std::atomic<std::size_t> loops_ = 0;
   std::atomic<bool> map_changed_ = false;
-  std::int64_t cloud_ns_ = 0, path_ns_ = 0;  // times of the last ones; these and the next three are the thread's
+  std::int64_t cloud_ns_ = 0, path_ns_ = 0;  // times of the last ones; these and the next five are the thread's
   bool cloud_due_ = false;
+  std::size_t cloud_subscribers_ = 0;  // at the last frame
   bool cloud_published_ = false, path_published_ = false;
   std::vector<bslam::Trajectory> earlier_;  // of the Systems that were replaced; the thread's
   bool stopped_ = false;

@@ -188,7 +188,7 @@ Outputs BslamNode::outputs() {
     path_.publish(message);
   };
   out.diagnostics = [this](const std::vector<DiagnosticStatus>& statuses) { publish_diagnostics(statuses); };
-  out.wants_cloud = [this] { return cloud_.getNumSubscribers() > 0; };
+  out.cloud_subscribers = [this] { return cloud_.getNumSubscribers(); };
   out.wants_path = [this] { return path_.getNumSubscribers() > 0; };
   out.log = write_log;
   return out;

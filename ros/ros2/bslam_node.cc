@@ -239,7 +239,7 @@ Outputs BslamNode::outputs() {
     path_->publish(message);
   };
   out.diagnostics = [this](const std::vector<DiagnosticStatus>& statuses) { publish_diagnostics(statuses); };
-  out.wants_cloud = [this] { return cloud_->get_subscription_count() > 0; };
+  out.cloud_subscribers = [this] { return cloud_->get_subscription_count(); };
   out.wants_path = [this] { return path_->get_subscription_count() > 0; };
   out.log = [this](bslam::LogLevel level, const std::string& line) {
     if (level == bslam::LogLevel::kWarning) {

@@ -182,6 +182,33 @@ TEST_F(RosRunner, ContinuesInALoadedMapWithTheSameOdometry) {
   EXPECT_FALSE(std::filesystem::exists((folder_.path() / "walk_2.tum").string()));
 }
 
+TEST_F(RosRunner, EverySubscriberGetsThePointsOfAMapThatDoesNotChange) {
+  parameters_.map_file = (folder_.path() / "wall.bmap").string();
+  {
+    Parameters first = parameters_;
+    first.map_file.clear();
+    const auto runner = SlamRunner::create(*rig_, first, published_.outputs());
+    ASSERT_TRUE(runner) << runner.error().message();
+    push(**runner, 0, kFrames, 0);
+    ASSERT_TRUE(published_.wait_for_poses(kFrames));
+    ASSERT_TRUE((*runner)->save_map(parameters_.map_file));
+  }
+  published_.clouds.clear();
+  published_.poses.clear();
+  parameters_.settings.push_back("localize_only=true");
+  parameters_.cloud_period = 0;
+  Outputs outputs = published_.outputs();
+  std::size_t calls = 0;
+  outputs.cloud_subscribers = [&calls] { return ++calls < 5 ? std::size_t{1} : std::size_t{2}; };
+  const auto runner = SlamRunner::create(*rig_, parameters_, outputs);
+  ASSERT_TRUE(runner) << runner.error().message();
+  push(**runner, kFrames, kFrames + 20, 0);
+  ASSERT_TRUE((*runner)->stop());
+  ASSERT_GT(calls, 5u);
+  ASSERT_EQ(published_.clouds.size(), 2u);
+  EXPECT_GT(published_.clouds.front().points.size(), 50u);
+}
+
 TEST_F(RosRunner, RejectedImagesAreCountedAndSaidOnce) {
   const auto runner = make_runner();
   const std::vector<std::uint8_t> bytes(100);
