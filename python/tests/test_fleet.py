@@ -53,6 +53,21 @@ def contents(folder):
     return {str(f.relative_to(folder)): f.read_bytes() for f in files}
 
 
+def composed(folder, pieces):
+    """A recording of the first images of others: (recording, number of images, seconds added to their time stamps)."""
+    for camera in ("cam0", "cam1"):
+        data = folder / f"mav0/{camera}/data"
+        data.mkdir(parents=True)
+        rows = ["#timestamp [ns],filename"]
+        for recording, count, later in pieces:
+            for image in sorted((recording / f"mav0/{camera}/data").iterdir())[:count]:
+                stamp = int(image.stem) + later * 1_000_000_000
+                (data / f"{stamp}.png").symlink_to(image)
+                rows.append(f"{stamp},{stamp}.png")
+        (data.parent / "data.csv").write_text("\n".join(rows) + "\n")
+    (folder / "rig.yaml").symlink_to(pieces[0][0] / "rig.yaml")
+
+
 def test_one_place_is_one_map_and_the_other_is_apart(two_workers, recordings):
     assert [r.state for r in two_workers.recordings] == ["joined", "joined", "joined", "apart"]
     assert two_workers.recordings[3].reason
@@ -131,11 +146,7 @@ def test_recording_that_cannot_be_read_does_not_stop_the_others(recordings, clus
 
 
 def test_part_of_a_recording_is_apart(recordings, cluster, two_workers, tmp_path):
-    for camera in ("cam0", "cam1"):
-        (tmp_path / f"part/mav0/{camera}/data").mkdir(parents=True)
-        for image in sorted((recordings[0] / f"mav0/{camera}/data").iterdir())[:16]:
-            (tmp_path / f"part/mav0/{camera}/data" / image.name).symlink_to(image)
-    (tmp_path / "part/rig.yaml").symlink_to(recordings[0] / "rig.yaml")
+    composed(tmp_path / "part", [(recordings[0], 16, 0)])
     cache = two_workers.folder / "cache"
     with Client(cluster) as client:
         site = map_recordings([*recordings[:2], tmp_path / "part"], tmp_path / "site", client=client, cache=cache)
@@ -148,13 +159,7 @@ def test_part_of_a_recording_is_apart(recordings, cluster, two_workers, tmp_path
 
 
 def test_all_submaps_of_a_recording_are_kept(recordings, cluster, two_workers, tmp_path):
-    for camera in ("cam0", "cam1"):
-        (tmp_path / f"two_places/mav0/{camera}/data").mkdir(parents=True)
-        for number, place in enumerate((recordings[0], recordings[3])):
-            for image in (place / f"mav0/{camera}/data").iterdir():
-                stamp = int(image.stem) + number * 5_000_000_000
-                (tmp_path / f"two_places/mav0/{camera}/data/{stamp}.png").symlink_to(image)
-    (tmp_path / "two_places/rig.yaml").symlink_to(recordings[0] / "rig.yaml")
+    composed(tmp_path / "two_places", [(recordings[0], 24, 0), (recordings[3], 24, 5)])
     with Client(cluster) as client:
         given = [recordings[1], tmp_path / "two_places"]
         settings = ["looping.recovery.new_submap_after=3"]
