@@ -324,7 +324,13 @@ bslam::Status SlamRunner::write_trajectories() {
     const std::string file = earlier_trajectory_file(parameters_.trajectory_file, i + 1);
     if (const bslam::Status written = write_trajectory(file, earlier_[i]); !written) return written;
   }
+  // The adjustment of a large map may take longer than a launched node is given to end.
+  if (const bslam::Status written = write_present_trajectory(); !written) return written;
   if (const bslam::Status finished = system_->finish(); !finished) return finished;
+  return write_present_trajectory();
+}
+
+bslam::Status SlamRunner::write_present_trajectory() const {
   const auto trajectory = system_->trajectory(bslam::RigFrame::kBody);
   if (!trajectory) return trajectory.error();
   return write_trajectory(parameters_.trajectory_file, *trajectory);

@@ -50,8 +50,8 @@ class SlamRunner {
   std::vector<DiagnosticStatus> diagnostics() const;
 
   // Processes the images that have arrived and ends the thread; further images are rejected. Writes trajectory_file, if
-  // given, after adjusting the map, and beside it a numbered file for the time before each change of the map by a
-  // service (earlier_trajectory_file). Outputs are not called afterwards.
+  // given, and again after adjusting the map, and beside it a numbered file for the time before each change of the map
+  // by a service (earlier_trajectory_file). Outputs are not called afterwards.
   bslam::Status stop();
 
  private:
@@ -77,6 +77,7 @@ class SlamRunner {
   void publish_path(const bslam::FrameResult& frame);
   void log(bslam::LogLevel level, const std::string& line) const;
   bslam::Status write_trajectories();
+  bslam::Status write_present_trajectory() const;
   bslam::Status write_trajectory(const std::string& file, bslam::Trajectory trajectory) const;
 
   const bslam::Rig rig_;

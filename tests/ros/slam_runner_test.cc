@@ -2,8 +2,11 @@
 #include "core/slam_runner.h"
 
 #include <gtest/gtest.h>
+#include <sys/inotify.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <condition_variable>
 #include <filesystem>
 #include <fstream>
@@ -126,6 +129,43 @@ TEST_F(RosRunner, PublishesPosesPointsPathAndTrajectory) {
   const std::string written = bslam::support::read_text((folder_.path() / "end.tum").string());
   EXPECT_EQ(written.rfind("# bslam trajectory frame=body parent=map final=true\n", 0), 0u) << written.substr(0, 100);
   EXPECT_FALSE(std::filesystem::exists((folder_.path() / "end_1.tum").string()));
+}
+
+// The names of files that appear in a folder under their final name, by inotify. Two events with the same name are one
+// unless there is another one between them, such as that of the unfinished file.
+class Appearing {
+ public:
+  explicit Appearing(const std::filesystem::path& folder) : events_(inotify_init1(IN_NONBLOCK)) {
+    inotify_add_watch(events_, folder.c_str(), IN_CREATE | IN_MOVED_TO);
+  }
+  ~Appearing() { close(events_); }
+  Appearing(const Appearing&) = delete;
+  Appearing& operator=(const Appearing&) = delete;
+  std::vector<std::string> names() const {
+    std::vector<std::string> out;
+    alignas(inotify_event) std::array<char, 4096> buffer;
+    for (ssize_t size; (size = read(events_, buffer.data(), buffer.size())) > 0;) {
+      for (const char* at = buffer.data(); at < buffer.data() + size;) {
+        const auto* event = reinterpret_cast<const inotify_event*>(at);
+        if (event->mask & IN_MOVED_TO) out.emplace_back(event->name);
+        at += sizeof(inotify_event) + event->len;
+      }
+    }
+    return out;
+  }
+
+ private:
+  const int events_;
+};
+
+TEST_F(RosRunner, TheTrajectoryIsWrittenBeforeTheLastAdjustmentAndAfterIt) {
+  parameters_.trajectory_file = (folder_.path() / "end.tum").string();
+  const auto runner = make_runner();
+  push(*runner, 0, kFrames, 0);
+  ASSERT_TRUE(published_.wait_for_poses(kFrames));
+  const Appearing appearing(folder_.path());
+  ASSERT_TRUE(runner->stop());
+  EXPECT_EQ(appearing.names(), (std::vector<std::string>{"end.tum", "end.tum"}));
 }
 
 TEST_F(RosRunner, OutputsMayThrow) {

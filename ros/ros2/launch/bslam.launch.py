@@ -21,5 +21,7 @@ def generate_launch_description():
     parameters = {name: ParameterValue(LaunchConfiguration(name), value_type=str) for name in TEXTS}
     parameters['image_topics'] = ParameterValue(LaunchConfiguration('image_topics'), value_type=List[str])
     parameters.update({name: ParameterValue(LaunchConfiguration(name), value_type=bool) for name in SWITCHES})
-    node = Node(package='bslam_ros', executable='bslam_node', name='bslam', output='screen', parameters=[parameters])
+    # Seconds after SIGINT and SIGTERM: at its end, the node adjusts the map and writes trajectory_file.
+    node = Node(package='bslam_ros', executable='bslam_node', name='bslam', output='screen', parameters=[parameters],
+                sigterm_timeout='120', sigkill_timeout='10')
     return LaunchDescription(arguments + [node])
