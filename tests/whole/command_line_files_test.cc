@@ -70,7 +70,7 @@ TEST_F(CommandLine, NoFileThatIsReadAndNoneOfAnotherKindIsReplaced) {
                     is_read = "--out: found a file that this command reads",
                     is_other = "an existing file of another kind";
   const std::string uncalibrated = "rig calibrate " + data() + " --overwrite --out ";
-  const std::vector<std::array<std::string, 3>> all = {{uncalibrated, data() + "/rig.yaml", is_read},
+  const std::vector<std::array<std::string, 3>> all = {{uncalibrated, data() + "/mav0/cam0/sensor.yaml", is_read},
                                                        {calibrate, out("rough.yaml"), is_read},
                                                        {calibrate, out("settings.yaml"), is_read},
                                                        {calibrate, out("notes.txt"), is_other},
