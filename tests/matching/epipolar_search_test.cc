@@ -28,9 +28,9 @@ struct Pair {
   std::vector<int> partner;
 };
 
-void add(const Camera& camera, const Vector2d& pixel, const feature::Descriptor& d, feature::Detections& k) {
+void add(const Camera& camera, const Vector2d& pixel, int level, const feature::Descriptor& d, feature::Detections& k) {
   k.pixel.push_back(pixel.cast<float>());
-  k.level.push_back(0);
+  k.level.push_back(static_cast<std::uint8_t>(level));
   k.angle.push_back(0);
   k.sigma.push_back(0.7f);
   k.bearing.push_back(*camera.unproject(pixel));
@@ -50,9 +50,13 @@ feature::Descriptor flipped(feature::Descriptor d, int bits, Random& random) {
   return d;
 }
 
-// Points in all directions at distances of 0.5 to 20 m that a observes; b observes a subset, with noise.
+// Points in all directions at distances of 0.5 to 20 m that a observes; b observes a subset, with noise. The camera
+// with more pixels per angle shows them on a coarser level.
 Pair seen_by(const Camera& a, const Camera& b, const SE3& T_common_a, const SE3& T_common_b, std::size_t count) {
   Random random(11, "epipolar");
+  const int finer =
+      static_cast<int>(std::lround(std::log(a.radians_per_pixel() / b.radians_per_pixel()) / std::log(1.2)));
+  const int level_a = std::max(0, -finer), level_b = std::max(0, finer);
   Pair out;
   while (out.a.size() < count) {
     const Vector2d pixel(random.uniform(0, a.width - 1), random.uniform(0, a.height - 1));
@@ -61,17 +65,17 @@ Pair seen_by(const Camera& a, const Camera& b, const SE3& T_common_a, const SE3&
     const feature::Descriptor descriptor = random_descriptor(random);
     const double distance = 0.5 * std::pow(40.0, random.uniform());
     const auto there = b.project(T_common_b.inverse() * (T_common_a * (distance * *bearing)));
-    add(a, pixel, descriptor, out.a);
+    add(a, pixel, level_a, descriptor, out.a);
     out.partner.push_back(-1);
     if (!there) continue;
     const Vector2d noisy = *there + 0.5 * Vector2d(random.normal(), random.normal());
     if (!b.contains(noisy) || !b.unproject(noisy)) continue;
     out.partner.back() = static_cast<int>(out.b.size());
-    add(b, noisy, flipped(descriptor, 12, random), out.b);
+    add(b, noisy, level_b, flipped(descriptor, 12, random), out.b);
   }
   for (std::size_t i = 0; i < count / 5; ++i) {  // points observed by b only
     const Vector2d pixel(random.uniform(0, b.width - 1), random.uniform(0, b.height - 1));
-    if (b.unproject(pixel)) add(b, pixel, random_descriptor(random), out.b);
+    if (b.unproject(pixel)) add(b, pixel, level_b, random_descriptor(random), out.b);
   }
   return out;
 }
@@ -199,7 +203,7 @@ TEST_F(MatchEpipolarSideBySide, IgnoresAmbiguousAndUnusableKeypoints) {
     if (pair.partner[k] < 0) continue;
     const auto j = static_cast<std::size_t>(pair.partner[k]);
     const Vector2d twin = pair.b.pixel[j].cast<double>() - Vector2d(20, 0);
-    if (camera.contains(twin)) add(camera, twin, pair.b.descriptor[j], doubled.b);
+    if (camera.contains(twin)) add(camera, twin, 0, pair.b.descriptor[j], doubled.b);
   }
   std::swap(pair, doubled);
   EXPECT_LT(match({}).size(), all / 2);
