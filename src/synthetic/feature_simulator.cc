@@ -111,9 +111,11 @@ std::optional<FeatureSimulator::View> FeatureSimulator::view(std::size_t landmar
   const SimulatedLandmark& l = landmarks_[landmark];
   const geometry::SE3 T_cam_world = T_world_cam.inverse();
   const Vector3d point = T_cam_world * l.position;
-  const double resolution = rig_.camera(0).radians_per_pixel() / rig_.camera(camera).radians_per_pixel();
-  const double scale = resolution * l.base_distance / point.norm();
-  const int level = static_cast<int>(std::lround(std::log(scale) / std::log(options_.scale_factor)));
+  const auto levels = [&](double factor) {
+    return static_cast<int>(std::lround(std::log(factor) / std::log(options_.scale_factor)));
+  };
+  const double finer = rig_.camera(0).radians_per_pixel() / rig_.camera(camera).radians_per_pixel();
+  const int level = levels(l.base_distance / point.norm()) + levels(finer);
   if (level < 0 || level >= options_.levels) return std::nullopt;
   const auto projection = rig_.camera(camera).project_with_jacobian(point);
   constexpr double kMargin = 8.0;  // pixels; feature extractors ignore the border too

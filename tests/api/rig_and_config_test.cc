@@ -153,7 +153,7 @@ TEST(PublicConfig, SetsByNameAndRejectsInvalidValues) {
   EXPECT_FALSE(config.get("nothing"));
   EXPECT_EQ(*config.get("features.per_image"), "777");
   EXPECT_EQ(*config.get("execution.await_calibration"), "false");  // no frame of live cameras waits
-  EXPECT_EQ(*config.get("execution.await_mapping_s"), "0");
+  EXPECT_EQ(*config.get("execution.await_mapping_s"), "0.0");
   config.set_mode(Mode::kLagged);
   EXPECT_EQ(*config.get("mode"), "lagged");
 }
