@@ -77,6 +77,7 @@ TEST(SystemCalibration, SequentialAndLaggedRunsRepeatTheirPoses) {
     for (int repeat = 0; repeat < 2; ++repeat) {
       Config config = small_config(mode);
       config.execution.threads = repeat + 1;
+      config.calibration.refine = calibration::Refine::kTrue;
       System system(rotated(tour.rig(), 2), config);
       for (const image::ImageBundle& images : tour.frames()) must_process(system, images);
       system.finish();
