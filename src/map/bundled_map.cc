@@ -229,7 +229,7 @@ bool BundledMap::remove_observation(LandmarkId l, KeyframeId k) {
   if (rest.empty()) {
     mark_removed(l, {});
   } else if (landmark(l).reference.keyframe == k) {
-    replace_reference(l);
+    edit(l).reference = reference_among(rest);
   }
   return true;
 }

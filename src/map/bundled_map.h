@@ -191,10 +191,9 @@ class BundledMap {
                           const LandmarkReference& reference = {}, KeyframeId born = {});
   // Also returns false if the keyframe already observes the landmark or the feature already has one.
   bool add_observation(LandmarkId l, Observation o);
-  // Removing the last observation removes the landmark. If the reference is removed, the first keypoint of a remaining
-  // observation becomes the reference: of the oldest one that has a patch and is aligned to the old reference. If there
-  // is none, of the oldest one that has a patch, or of the oldest one; no other observation is then aligned any more.
-  // Also returns false if the keyframe does not observe the landmark.
+  // Removing the last observation removes the landmark. If the reference is removed, the first keypoint of the oldest
+  // remaining observation that has a patch becomes the reference, or that of the oldest observation if none has a
+  // patch. Also returns false if the keyframe does not observe the landmark.
   bool remove_observation(LandmarkId l, KeyframeId k);
   bool remove_landmark(LandmarkId l);
   // Merges `from` into `into`: observations are moved unless the keyframe already observes `into`, and visibility
@@ -265,11 +264,7 @@ class BundledMap {
   void mark_removed(LandmarkId l, LandmarkId merged_into);  // must have no observations left
 
   // In release_memory.cc.
-  const Observation& reference_among(std::span<const Observation> observations) const;
-  frame::KeypointRef first_keypoint(const Observation& o) const {
-    return keyframe(o.keyframe).frame->bundled.keypoints(o.feature).front();
-  }
-  void replace_reference(LandmarkId l);
+  LandmarkReference reference_among(std::span<const Observation> observations) const;
   void release_unused(KeyframeId k);
 
   // In fill_map.cc.

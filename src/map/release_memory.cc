@@ -1,4 +1,4 @@
-// Releases memory that a map no longer needs, and replaces the reference of a landmark that was removed.
+// Releases memory that a map no longer needs.
 #include <algorithm>
 
 #include "base/mapped_file.h"
@@ -51,31 +51,17 @@ void BundledMap::release_unused(KeyframeId k) {
   edit(k).frame = std::make_shared<const frame::BundledFrame>(std::move(out));
 }
 
-// Of the observations whose first keypoint has a patch, the oldest of those aligned to the reference, else the oldest;
-// or the oldest of all if none has a patch.
-const Observation& BundledMap::reference_among(std::span<const Observation> observations) const {
-  const Observation* with_patch = nullptr;
+// The oldest observation whose first keypoint has a patch, or the oldest if there is none.
+LandmarkReference BundledMap::reference_among(std::span<const Observation> observations) const {
+  const auto first = [&](const Observation& o) {
+    return LandmarkReference{o.keyframe, keyframe(o.keyframe).frame->bundled.keypoints(o.feature).front()};
+  };
   for (const Observation& o : observations) {
-    const frame::KeypointRef r = first_keypoint(o);
-    if (keypoints(o.keyframe, r.camera).patch.find(r.keypoint.index()) == nullptr) continue;
-    if (o.aligned) return o;
-    if (with_patch == nullptr) with_patch = &o;
+    const LandmarkReference reference = first(o);
+    const frame::KeypointRef r = reference.keypoint;
+    if (keypoints(o.keyframe, r.camera).patch.find(r.keypoint.index()) != nullptr) return reference;
   }
-  return with_patch != nullptr ? *with_patch : observations.front();
-}
-
-// Makes another observation the reference. If it was not aligned to the old one, the positions of the others do not
-// refer to its patch.
-void BundledMap::replace_reference(LandmarkId l) {
-  const auto list = observations(l);
-  const Observation& reference = reference_among(list);
-  edit(l).reference = {reference.keyframe, first_keypoint(reference)};
-  if (reference.aligned) return;
-  for (Observation o : std::vector<Observation>(list.begin(), list.end())) {
-    observations_.erase(l.index(), o, owner_.tag());
-    o.aligned = o.keyframe == landmark(l).reference.keyframe;
-    observations_.insert(l.index(), o, owner_.tag());
-  }
+  return first(observations.front());
 }
 
 }  // namespace bslam::map

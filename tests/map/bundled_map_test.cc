@@ -228,44 +228,6 @@ TEST_F(BundledMapTest, PassesTheReferenceToTheOldestRemainingObservation) {
   expect_valid();
 }
 
-// The patch of an observation that is aligned to the reference is at the same point of the scene. One that is not is at
-// another point, within the error of the detector, to which no other observation is aligned.
-TEST_F(BundledMapTest, PassesTheReferenceToAnAlignedObservation) {
-  const KeyframeId a = add({}, {}), b = add({}, {}), c = add({}, {}), d = add({}, {});
-  const std::vector<Observation> observations = {
-      {a, FeatureId(3), false}, {b, FeatureId(3), true}, {c, FeatureId(3), true}, {d, FeatureId(3), true}};
-  const frame::KeypointRef of_d = map.keyframe(d).frame->bundled.keypoints(FeatureId(3)).front();
-  const LandmarkId l = map.add_landmark(random_point(random), observations, {d, of_d});
-  const auto aligned = [&] {
-    std::vector<KeyframeId> out;
-    for (const Observation& o : map.observations(l)) {
-      if (o.aligned) out.push_back(o.keyframe);
-    }
-    return out;
-  };
-  map.remove_observation(l, d);
-  EXPECT_EQ(map.landmark(l).reference.keyframe, b);
-  EXPECT_EQ(aligned(), (std::vector<KeyframeId>{b, c}));
-  map.remove_observation(l, c);
-  map.remove_observation(l, b);
-  EXPECT_EQ(map.landmark(l).reference.keyframe, a);
-  EXPECT_EQ(aligned(), std::vector<KeyframeId>{a});
-  expect_valid();
-}
-
-TEST_F(BundledMapTest, IfNoObservationIsAlignedToAReferenceTheNextOneDefinesTheLandmark) {
-  const KeyframeId a = add({}, {}), b = add({}, {}), c = add({}, {});
-  const std::vector<Observation> observations = {{a, FeatureId(3), false}, {b, FeatureId(3), false}, {c, FeatureId(3)}};
-  const frame::KeypointRef of_c = map.keyframe(c).frame->bundled.keypoints(FeatureId(3)).front();
-  const LandmarkId l = map.add_landmark(random_point(random), observations, {c, of_c});
-  map.remove_observation(l, c);
-  EXPECT_EQ(map.landmark(l).reference.keyframe, a);
-  const auto list = map.observations(l);
-  EXPECT_EQ(std::vector<Observation>(list.begin(), list.end()),
-            (std::vector<Observation>{{a, FeatureId(3), true}, {b, FeatureId(3), false}}));
-  expect_valid();
-}
-
 TEST_F(BundledMapTest, KeepsAGivenReference) {
   const KeyframeId a = add({}, {});
   const std::vector<Observation> observations = {{KeyframeId(0), FeatureId(45)}, {a, FeatureId(0)}};
