@@ -25,7 +25,7 @@ struct ExecutionOptions {
   // Parallel mode: a frame waits for keyframes that were requested longer before it, and for their mapping; 0: it does
   // not wait. The mapping of a recording that is processed faster than it was captured is thus no later, in recorded
   // time, than that of live cameras. Frames that come in real time do not wait.
-  double await_mapping_s = 0.15;
+  double await_mapping_s = 0.3;
   // Lagged mode: a stage's result is used this number of frames after the frame at which the stage started. It should
   // be slightly longer than the stage takes, to avoid waiting; lag_global is for maps of some hundred keyframes.
   int lag_keyframe = 1, lag_map = 3, lag_loop = 5, lag_calibrate = 40, lag_global = 40;
