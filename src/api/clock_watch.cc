@@ -5,7 +5,6 @@
 namespace bslam::api {
 namespace {
 
-constexpr TimeNs kIntervals = 4;    // number of intervals of a camera for which its images may be absent
 constexpr int kFarImages = 3;       // number of consecutive images far ahead after which a clock may be believed
 constexpr TimeNs kLeadImages = 16;  // number of images after which a lead is forgotten, about
 constexpr TimeNs kMaxInterval = 1'000'000'000'000'000;  // so that no multiple of an interval overflows
@@ -17,7 +16,7 @@ ClockWatch::ClockWatch(std::size_t cameras, const Limits& limits)
 
 bool ClockWatch::is_live(const Clock& clock) const {
   return clock.newest_ns &&
-         *newest_ns_ - *clock.newest_ns <= std::max(limits_.silent_after_ns, kIntervals * clock.interval_ns);
+         *newest_ns_ - *clock.newest_ns <= std::max(limits_.silent_after_ns, kAbsentIntervals * clock.interval_ns);
 }
 
 std::optional<TimeNs> ClockWatch::newest_of_others(std::size_t c) const {
@@ -33,7 +32,7 @@ std::optional<TimeNs> ClockWatch::newest_of_others(std::size_t c) const {
 ClockWatch::Ahead ClockWatch::ahead(std::size_t c, TimeNs time_ns, TimeNs caught_up_ns) const {
   const Clock& clock = clocks_[c];
   const TimeNs gap = time_ns - *newest_ns_;
-  if (gap > limits_.far_ns && gap / kIntervals > clock.interval_ns) return Ahead::kFar;
+  if (gap > limits_.far_ns && gap / kAbsentIntervals > clock.interval_ns) return Ahead::kFar;
   const std::optional<TimeNs> others_ns = newest_of_others(c);
   if (!others_ns || !clock.lead_ns || time_ns - *others_ns + caught_up_ns <= limits_.step_ns) return Ahead::kNo;
   const TimeNs step_ns = time_ns - *others_ns - std::max(*clock.lead_ns - caught_up_ns, TimeNs{0});
@@ -50,7 +49,7 @@ bool ClockWatch::opposed(std::size_t c, TimeNs time_ns) const {
   for (std::size_t d = 0; d < clocks_.size(); ++d) {
     const Clock& other = clocks_[d];
     if (d == c || !is_live(other)) continue;
-    const TimeNs late_ns = std::max(limits_.step_ns, kIntervals * other.interval_ns);
+    const TimeNs late_ns = std::max(limits_.step_ns, kAbsentIntervals * other.interval_ns);
     const TimeNs stopped_ns = clock.refuted ? std::max(limits_.silent_after_ns, late_ns) : late_ns;
     if (other.doubtful > 0 && time_ns - other.doubtful_until_ns <= late_ns) {
       ++agreeing;

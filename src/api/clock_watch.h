@@ -10,6 +10,8 @@
 
 namespace bslam::api {
 
+inline constexpr TimeNs kAbsentIntervals = 4;  // number of intervals of a camera for which its images may be absent
+
 // A time stamp steps ahead if it follows the camera's former one by more than its rate explains, and the other cameras
 // have not advanced as much. A step is believed if most of the other cameras make it as well, if there are none, or if
 // they stop. It is refuted by any other camera that continues as before; the images of the camera are then not used

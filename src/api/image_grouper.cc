@@ -10,7 +10,6 @@ namespace {
 
 // Half of the range, so that adding a delay cannot overflow.
 constexpr TimeNs kForever = std::numeric_limits<TimeNs>::max() / 2;
-constexpr TimeNs kSilentIntervals = 4;  // number of intervals of a camera for which its images may be absent
 // Number of intervals between images from which the rate of a camera is computed.
 constexpr std::size_t kRateIntervals = 16;
 
@@ -138,7 +137,7 @@ TimeNs ImageGrouper::complete_until(std::size_t c) const {
   const std::vector<TimeNs>& recent = recent_[c];
   const TimeNs last_ns = recent.empty() ? clocks_.first_ns() : recent.back();
   const TimeNs interval_ns = shortest_interval(recent), gap_ns = clocks_.newest_ns() - last_ns;
-  if (gap_ns > silent_after_ && gap_ns / kSilentIntervals > interval_ns) return kForever;
+  if (gap_ns > silent_after_ && gap_ns / kAbsentIntervals > interval_ns) return kForever;
   const TimeNs timeout = clocks_.newest_ns() - max_wait_;
   if (recent.empty()) return timeout;
   const TimeNs next_due = last_ns + interval_ns / 4 * 3 - reorder_;

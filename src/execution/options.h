@@ -23,8 +23,8 @@ struct ExecutionOptions {
   // be estimated. Not in sequential mode, which always waits, and not where frames come in real time.
   bool await_calibration = true;
   // Parallel mode: a frame waits for keyframes that were requested longer before it, and for their mapping; 0: it does
-  // not wait. The mapping of a recording that is processed faster than it was captured is thus no later, in recorded
-  // time, than that of live cameras. Frames that come in real time do not wait.
+  // not wait. It bounds the age of the map, in recorded time, if a recording is processed faster than it was captured.
+  // Frames that come in real time do not wait.
   double await_mapping_s = 0.3;
   // Lagged mode: a stage's result is used this number of frames after the frame at which the stage started. It should
   // be slightly longer than the stage takes, to avoid waiting; lag_global is for maps of some hundred keyframes.

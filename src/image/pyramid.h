@@ -15,7 +15,7 @@ struct Resampling;  // weights of the pixels of one level in those of the next
 struct Pyramid {
   std::vector<Image> levels;
   std::vector<double> scale_x, scale_y;  // pixels of level 0 per pixel of the level (exact: width_0 / width_l)
-  double factor = 1.0;                   // that from each level to the next, but for the rounding of the sizes
+  double factor = 1.2;                   // that from each level to the next, but for the rounding of the sizes
 
   // Weights from each level to the next, for images of these sizes.
   std::vector<std::shared_ptr<const Resampling>> resampling;
