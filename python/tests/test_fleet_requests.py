@@ -12,7 +12,7 @@ import pytest
 
 pytest.importorskip("distributed", reason="distributed is not installed: the fleet is not tested")
 
-from bslam.fleet import map_recordings
+from bslam.fleet import _interruption, map_recordings
 from bslam.fleet._cache import content_of
 from bslam.fleet._files import shared_rig
 from bslam.fleet._site import _named
@@ -42,8 +42,21 @@ def test_interruption_is_one_line(recording, tmp_path):
         os.killpg(process.pid, signal.SIGINT)  # as the terminal does it
         errors = process.stderr.read()
     assert process.returncode == 130
-    (line,) = [line for line in errors.splitlines() if line.strip() and not line.startswith("maps ")]
-    assert line == "bslam: interrupted; the same command continues"
+    lines = [line for line in errors.splitlines() if line.strip() and not line.startswith("maps ")]
+    assert lines == ["bslam: interrupted; the same command continues"]
+
+
+def test_interruption_is_noted_and_a_second_one_is_immediate():
+    with _interruption.noted():
+        with _interruption.noted():
+            os.kill(os.getpid(), signal.SIGINT)
+        with pytest.raises(KeyboardInterrupt):
+            _interruption.raise_if_noted()
+        with pytest.raises(KeyboardInterrupt):
+            os.kill(os.getpid(), signal.SIGINT)
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    with _interruption.noted():
+        _interruption.raise_if_noted()  # an earlier one is forgotten
 
 
 def test_no_maps_have_no_likely_pairs():

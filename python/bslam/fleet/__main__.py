@@ -7,6 +7,7 @@ import sys
 from typing import Any, NoReturn
 
 from .._bslam import Error
+from . import _interruption
 
 
 class _Parser(argparse.ArgumentParser):
@@ -40,7 +41,8 @@ def main() -> int:
     """Runs the command and returns its exit status."""
     options = vars(_arguments().parse_args())
     try:
-        return _map(**options)
+        with _interruption.noted():
+            return _map(**options)
     except ImportError as error:
         print(f"bslam: fleet needs the Python package distributed ({error}): pip install distributed", file=sys.stderr)
         return 2
@@ -55,6 +57,7 @@ def main() -> int:
 def _map(recordings: list[str], out: str, **options: Any) -> int:
     from ._site import map_recordings
 
+    _interruption.raise_if_noted()
     site = map_recordings(recordings, out, progress=True, **options)
     for warning in site.warnings:
         print(f"warning: {warning}", file=sys.stderr)

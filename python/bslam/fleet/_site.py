@@ -9,12 +9,11 @@ import logging
 import os
 import pathlib
 import re
-import signal
 import sys
 import threading
+import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from multiprocessing import resource_tracker
 from typing import Any
 
 import click
@@ -23,7 +22,7 @@ import numpy as np
 from distributed import CancelledError, Client, Future, KilledWorker, LocalCluster, as_completed
 
 from .. import _bslam
-from . import _files, _tasks
+from . import _files, _interruption, _tasks
 from ._cache import Result
 from ._files import Path
 from ._sketch import likely_pairs
@@ -31,6 +30,7 @@ from ._sketch import likely_pairs
 _FAN_IN = 5  # maps that are merged at once
 _NUMBERS = ("keyframes", "landmarks")  # sizes of a map
 _LOOK_S = 10.0  # time between looks for workers
+_POLL_S = 0.1  # time between looks for tasks that have ended, and for Ctrl-C
 _HASH = re.compile("[0-9a-f]{64}")
 
 
@@ -134,7 +134,7 @@ def map_recordings(
     folder = pathlib.Path(cache or out / "cache").absolute()
     _files.make_folder(folder, "--cache")
     setup = _tasks.Setup(str(folder), _tasks.program_hash(), *_files.options(folder, rig, config, settings))
-    with _connected(client, scheduler, workers, progress) as dask_client:
+    with _interruption.noted(), _connected(client, scheduler, workers, progress) as dask_client:
         return _Mapping(dask_client, setup, out, partners, progress, earlier).run(named)
 
 
@@ -163,8 +163,7 @@ def _named(recordings: Sequence[Path]) -> list[Recording]:
 
 @contextlib.contextmanager
 def _connected(client: Client | None, scheduler: str | None, workers: int | None, progress: bool) -> Iterator[Client]:
-    stack = contextlib.ExitStack()
-    try:
+    with contextlib.ExitStack() as stack:
         if client is None:
             client = _local_client(stack, workers) if scheduler is None else _client_of(stack, scheduler)
         if progress:
@@ -172,20 +171,6 @@ def _connected(client: Client | None, scheduler: str | None, workers: int | None
             if scheduler is not None:
                 stack.enter_context(_watched(client, scheduler))
         yield client
-    finally:
-        with _interruption_later():
-            stack.close()
-
-
-@contextlib.contextmanager
-def _interruption_later() -> Iterator[None]:
-    """An interruption (Ctrl-C) takes effect at the end. Threads and processes that are started here never see it."""
-    resource_tracker.ensure_running()  # when it starts, it would let interruptions through again
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @contextlib.contextmanager
@@ -202,7 +187,7 @@ def _watched(client: Client, scheduler: str) -> Iterator[None]:
                     print(f"no worker is connected to {scheduler}: start some by dask worker", file=sys.stderr)
             ended.wait(_LOOK_S)
 
-    with _interruption_later():
+    with _interruption.not_in_children():
         thread = threading.Thread(target=watch, daemon=True)
         thread.start()
     try:
@@ -216,7 +201,7 @@ def _local_client(stack: contextlib.ExitStack, workers: int | None) -> Client:
     # If a worker is killed, its task is probably not the cause; another worker tries it again.
     stack.enter_context(dask.config.set({"distributed.scheduler.allowed-failures": 100}))
     count = workers or os.cpu_count() or 1
-    with _interruption_later():
+    with _interruption.not_in_children():
         cluster = LocalCluster(
             n_workers=count,
             threads_per_worker=1,
@@ -278,8 +263,13 @@ class _Mapping:
     def _done(self, label: str, futures: list[Future]) -> list[Result]:
         file = sys.stderr if self.progress and futures else io.StringIO()
         with click.progressbar(length=len(futures), label=f"{label:<12}", file=file, show_pos=True) as bar:
-            for _ in as_completed(futures):
-                bar.update(1)
+            waiting = as_completed(futures)
+            while not waiting.is_empty():
+                _interruption.raise_if_noted()
+                if waiting.has_ready():
+                    bar.update(len(waiting.next_batch(block=False)))
+                else:
+                    time.sleep(_POLL_S)
         try:
             results = self.client.gather(futures)
         except (CancelledError, KilledWorker) as error:
