@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include "base/median.h"
 #include "estimators/pose_ransac.h"
 #include "frame/rig_at.h"
+#include "solver/pose_problem.h"
 #include "tracking/scene_agreement.h"
 
 namespace bslam::tracking {
@@ -31,6 +33,10 @@ constexpr double kWider = 2.0, kMaxWider = 3.0;
 // fewer the two are variations of one motion.
 constexpr std::size_t kMinOfMotion = 20;
 constexpr double kFractionOfInliers = 1.0 / 3;
+// Landmarks that agree with both motions belong to the one that predicts them better, if the sums of their squared
+// errors differ by this number of squared standard deviations. Far landmarks agree with every motion that is short
+// compared with their distance, but only the motion of the rig predicts them without a systematic error.
+constexpr double kPredictsBetter = 36.0;
 constexpr double kHardlyAny = 0.05;              // fraction of the landmarks of a motion that are confirmed
 constexpr double kFractionOfOutliers = 1.0 / 3;  // minimum fraction of the outliers of one motion that is another one
 
@@ -59,10 +65,11 @@ double extent(const std::vector<Eigen::Vector3d>& points) {
 // The poses of a frame from which one is chosen.
 class PoseChoice {
  public:
+  // `rig` and `motion` are those of solver::solve_pose; `motion` may be null.
   PoseChoice(const TrackInput& input, const frame::BundledFrame& frame, const FrameMatches& matches,
-             std::span<const solver::PoseObservation> observations, const geometry::SE3& predicted,
-             solver::PoseSolution first)
-      : map_(input.map), matches_(matches), observations_(observations) {
+             std::span<const solver::PoseObservation> observations, const camera::Rig& rig,
+             const solver::MotionModel* motion, const geometry::SE3& predicted, solver::PoseSolution first)
+      : map_(input.map), matches_(matches), observations_(observations), rig_(rig), motion_(motion) {
     if (newly_started(input, frame))
       scene_.emplace(input, frame, observations, predicted);
     else
@@ -163,10 +170,11 @@ class PoseChoice {
   }
 
   // The factor by which the support of another pose counts more or less than that of the best one: the ratio of the
-  // extents in space of the landmarks that agree with only one of the two. Landmarks that agree with both are far away.
-  // If those of one motion only are nearly all unconfirmed, this decides, and not the extent.
+  // extents in space of the landmarks that belong to only one of the two. If those of one motion only are nearly all
+  // unconfirmed, this decides, and not the extent.
   double relative_extent(const solver::PoseSolution& other) const {
-    const std::vector<Eigen::Vector3d> of_other = exclusive(other, best()), of_best = exclusive(best(), other);
+    std::vector<Eigen::Vector3d> of_other = exclusive(other, best()), of_best = exclusive(best(), other);
+    add_shared(other, of_other, of_best);
     if (!are_two_motions(of_other.size(), other, of_best.size())) return 1.0;
     if (is_unconfirmed(other, best()) != is_unconfirmed(best(), other)) return 1.0;
     const double ratio = extent(of_other) / extent(of_best);
@@ -175,6 +183,24 @@ class PoseChoice {
     const auto outliers = static_cast<double>(outliers_but_for_third_motions(other));
     if (ratio > 1.0 && static_cast<double>(of_other.size()) < kFractionOfOutliers * outliers) return 1.0;
     return std::clamp(ratio, 1.0 / kMaxWider, kMaxWider);
+  }
+
+  // Adds the landmarks that agree with both poses to those of the pose that predicts them clearly better, if any.
+  void add_shared(const solver::PoseSolution& other, std::vector<Eigen::Vector3d>& of_other,
+                  std::vector<Eigen::Vector3d>& of_best) const {
+    std::vector<solver::PoseObservation> shared;
+    for (std::size_t i = 0; i < observations_.size(); ++i) {
+      if (other.inlier[i] && best().inlier[i]) shared.push_back(observations_[i]);
+    }
+    if (shared.empty()) return;
+    constexpr double kAll = std::numeric_limits<double>::infinity();
+    const solver::PoseProblem problem(rig_, shared, motion_);
+    const double chi2_other = problem.truncated_cost(other.T_rig_world, kAll, kAll);
+    const double chi2_best = problem.truncated_cost(best().T_rig_world, kAll, kAll);
+    const double variance = std::min(chi2_other, chi2_best) / (2.0 * static_cast<double>(shared.size()));
+    if (!(std::abs(chi2_other - chi2_best) > kPredictsBetter * variance)) return;
+    std::vector<Eigen::Vector3d>& owner = chi2_other < chi2_best ? of_other : of_best;
+    for (const solver::PoseObservation& o : shared) owner.push_back(o.point_world);
   }
 
   // Whether hardly any landmark that agrees with a pose but not with another is confirmed.
@@ -229,6 +255,8 @@ class PoseChoice {
   const map::BundledMap& map_;
   const FrameMatches& matches_;
   std::span<const solver::PoseObservation> observations_;
+  const camera::Rig& rig_;
+  const solver::MotionModel* motion_;
   std::optional<SceneMatches> scene_;
   std::vector<std::uint8_t> confirmed_;  // per observation; empty if all are
   std::vector<Candidate> candidates_;
@@ -286,7 +314,7 @@ ChosenPose robust_pose(const TrackInput& input, const frame::BundledFrame& frame
   };
   const auto of_outliers = first.ok ? solver::solve_pose(rig, outliers(first, observations), predicted, motion, options)
                                     : solver::PoseSolution();
-  PoseChoice choice(input, frame, matches, observations, predicted, std::move(first));
+  PoseChoice choice(input, frame, matches, observations, rig, &motion, predicted, std::move(first));
   if (of_outliers.ok) choice.consider(pose_near(of_outliers.T_rig_world));
   choice.consider(pose_near(predicted));
   const auto of_confirmed = solver::solve_pose(rig, choice.confirmed(), predicted, motion, options);
@@ -312,7 +340,7 @@ ChosenPose sampled_pose(const TrackInput& input, const frame::BundledFrame& fram
   solver::PoseSolverOptions near_start = options;
   near_start.first_chi2 = kAgreesWithStart;
   const auto of_outliers = first.ok ? sample(outliers(first, observations), "outliers") : solver::PoseSolution();
-  PoseChoice choice(input, frame, matches, observations, predicted, std::move(first));
+  PoseChoice choice(input, frame, matches, observations, rig, nullptr, predicted, std::move(first));
   if (of_outliers.ok) choice.consider(solver::solve_pose(rig, observations, of_outliers.T_rig_world, near_start));
   choice.consider(solver::solve_pose(rig, observations, predicted, near_start));
   return std::move(choice).chosen();
