@@ -105,6 +105,7 @@ class PoseChoice {
 
   ChosenPose chosen() && {
     ChosenPose out;
+    out.matches = observations_.size() - matches_of_other_motions();
     const double half = kContested * candidates_[best_].support.sum();
     for (const Candidate& other : candidates_) {
       if (!best().ok || !other.solution.ok || !same_cameras_observe(other.solution)) continue;
@@ -150,14 +151,27 @@ class PoseChoice {
            weighted.sum() > kMoreSupport * of_best.sum();
   }
 
+  // The number of outliers of the best pose that are inliers of other motions.
+  std::size_t matches_of_other_motions() const {
+    if (!best().ok) return 0;
+    std::vector<std::uint8_t> of_others(observations_.size());
+    for (const Candidate& other : candidates_) {
+      if (!other.solution.ok || !are_two_motions(num_exclusive(other.solution, best()), other.solution,
+                                                 num_exclusive(best(), other.solution)))
+        continue;
+      for (std::size_t i = 0; i < of_others.size(); ++i) of_others[i] |= is_exclusive(i, other.solution, best());
+    }
+    return static_cast<std::size_t>(std::ranges::count(of_others, std::uint8_t{1}));
+  }
+
   // Whether another pose and the best one are those of two motions that the same cameras observe. If each agrees with
   // other cameras, a camera is late or displaced.
   bool same_cameras_observe(const solver::PoseSolution& other) const {
     std::vector<std::size_t> of_other(matches_.size()), of_best(matches_.size());
     for (std::size_t i = 0; i < observations_.size(); ++i) {
       const std::size_t camera = observations_[i].camera.index();
-      of_other[camera] += other.inlier[i] && !best().inlier[i];
-      of_best[camera] += best().inlier[i] && !other.inlier[i];
+      of_other[camera] += is_exclusive(i, other, best());
+      of_best[camera] += is_exclusive(i, best(), other);
     }
     std::size_t sum_other = 0, sum_best = 0, common = 0;
     for (std::size_t c = 0; c < matches_.size(); ++c) {
@@ -207,7 +221,7 @@ class PoseChoice {
   bool is_unconfirmed(const solver::PoseSolution& with, const solver::PoseSolution& without) const {
     std::size_t all = 0, confirmed = 0;
     for (std::size_t i = 0; i < confirmed_.size(); ++i) {
-      if (!with.inlier[i] || without.inlier[i]) continue;
+      if (!is_exclusive(i, with, without)) continue;
       ++all;
       confirmed += confirmed_[i];
     }
@@ -243,11 +257,22 @@ class PoseChoice {
     return exclusive >= kMinOfMotion && static_cast<double>(exclusive) >= kFractionOfInliers * solution.num_inliers;
   }
 
+  // Whether observation i agrees with a pose but not with another.
+  static bool is_exclusive(std::size_t i, const solver::PoseSolution& with, const solver::PoseSolution& without) {
+    return with.inlier[i] != 0 && without.inlier[i] == 0;
+  }
+
+  static std::size_t num_exclusive(const solver::PoseSolution& with, const solver::PoseSolution& without) {
+    std::size_t out = 0;
+    for (std::size_t i = 0; i < with.inlier.size(); ++i) out += is_exclusive(i, with, without);
+    return out;
+  }
+
   // Positions of the landmarks that agree with a pose but not with another.
   std::vector<Eigen::Vector3d> exclusive(const solver::PoseSolution& with, const solver::PoseSolution& without) const {
     std::vector<Eigen::Vector3d> out;
     for (std::size_t i = 0; i < observations_.size(); ++i) {
-      if (with.inlier[i] && !without.inlier[i]) out.push_back(observations_[i].point_world);
+      if (is_exclusive(i, with, without)) out.push_back(observations_[i].point_world);
     }
     return out;
   }
@@ -306,7 +331,8 @@ ChosenPose robust_pose(const TrackInput& input, const frame::BundledFrame& frame
   const frame::RigAt rig_at(input.map.rig(), frame);
   const camera::Rig& rig = *rig_at;
   solver::PoseSolution first = solver::solve_pose(rig, observations, predicted, motion, options);
-  if (!few(first, kFewInliers, observations.size())) return {.solution = std::move(first)};
+  if (!few(first, kFewInliers, observations.size()))
+    return {.solution = std::move(first), .matches = observations.size()};
   solver::PoseSolverOptions near_start = options;
   near_start.first_chi2 = kAgreesWithStart;
   const auto pose_near = [&](const geometry::SE3& start) {
@@ -336,7 +362,8 @@ ChosenPose sampled_pose(const TrackInput& input, const frame::BundledFrame& fram
                                    Random(input.seed, name, static_cast<std::uint64_t>(frame.id.value())));
   };
   solver::PoseSolution first = sample(observations, "wide search");
-  if (!few(first, kFewInliers, observations.size())) return {.solution = std::move(first)};
+  if (!few(first, kFewInliers, observations.size()))
+    return {.solution = std::move(first), .matches = observations.size()};
   solver::PoseSolverOptions near_start = options;
   near_start.first_chi2 = kAgreesWithStart;
   const auto of_outliers = first.ok ? sample(outliers(first, observations), "outliers") : solver::PoseSolution();

@@ -24,6 +24,8 @@ std::vector<std::uint8_t> agreeing_beyond_chance(const camera::Rig& rig,
 // A pose chosen among those of several motions.
 struct ChosenPose {
   solver::PoseSolution solution;
+  // Number of matches but for those that show another motion: these are no evidence against the pose.
+  std::size_t matches = 0;
   MotionContest contest{};
 };
 

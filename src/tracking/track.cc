@@ -95,11 +95,11 @@ bool track_in_narrow_windows(const TrackInput& input, const std::vector<Landmark
   drop(excluded, found);
   if (count(found) < static_cast<std::size_t>(options.min_inliers)) return false;
   const solver::MotionModel motion = motion_model(input, frame);
-  auto [solution, contest] = robust_pose(input, frame, found, pose_observations(map, frame, found, input.features),
-                                         predicted, motion, options.pose);
+  auto [solution, matches, contest] = robust_pose(
+      input, frame, found, pose_observations(map, frame, found, input.features), predicted, motion, options.pose);
   const std::vector<std::uint8_t> contradicting =
       exclude_contradicting(input, frame, options, found, excluded, solution);
-  if (!supported(solution, count(found), options.min_inliers, options)) return false;
+  if (!supported(solution, std::min(matches, count(found)), options.min_inliers, options)) return false;
   out.contest.add(contest);
   out.frame.twist = motion.twist(solution.T_rig_world);
   out.T_rig_world = solution.T_rig_world;
@@ -131,11 +131,11 @@ bool track_in_wide_windows(const TrackInput& input, const std::vector<LandmarkId
   drop(out.excluded, search.found);
   if (count(search.found) < static_cast<std::size_t>(options.min_inliers_wide)) return false;
   const auto observations = pose_observations(map, frame, search.found, input.features);
-  const auto [solution, contest] =
+  const auto [solution, matches, contest] =
       sampled_pose(input, frame, search.found, observations, out.T_rig_world, options.pose);
   out.reason = LostReason::kFewInliers;
   if (!solution.ok || solution.num_inliers < options.min_inliers_wide) return false;
-  if (!supported(solution, observations.size(), options.min_inliers_wide, options)) {
+  if (!supported(solution, matches, options.min_inliers_wide, options)) {
     Coarse confirmed = out;
     confirmed.T_rig_world = solution.T_rig_world;
     if (!track_in_narrow_windows(input, landmarks, options, pool, confirmed)) return false;
@@ -220,6 +220,7 @@ struct Fine {
   solver::PoseSolution solution;
   geometry::Vector6d twist;  // rad/s, map units/s
   FrameMatches matches;      // inliers and outliers
+  std::size_t num_matches;   // see ChosenPose::matches
   AlignedMatches aligned;    // for all of `matches`
   std::vector<LandmarkId> visible;
   std::vector<LandmarkCounts> views;  // per camera: landmarks of the local view that are expected and found
@@ -263,6 +264,7 @@ Fine track_local_view(const TrackInput& input, const Coarse& coarse, const Track
   auto chosen = robust_pose(input, frame, out.matches, pose_observations(map, out.matches, out.aligned),
                             coarse.T_rig_world, motion, options.pose);
   out.solution = std::move(chosen.solution);
+  out.num_matches = chosen.matches;
   out.contest = coarse.contest;
   out.contest.add(chosen.contest);
   out.twist = motion.twist(out.solution.T_rig_world);
@@ -374,7 +376,7 @@ TrackOutput track(const TrackInput& input, const frame::BundledFrame& frame, con
   if (coarse.reason != LostReason::kNone) return lost(input.state, frame, coarse.reason);
   Fine fine = track_local_view(input, coarse, options, pool);
   if (fine.solution.num_inliers < options.min_inliers) return lost(input.state, frame, LostReason::kFewInliers);
-  if (!supported(fine.solution, count(fine.matches), options.min_inliers, options) &&
+  if (!supported(fine.solution, fine.num_matches, options.min_inliers, options) &&
       !(fine.solution.ok && coarse_pose_confirmed(input, coarse, fine, options)))
     return lost(input.state, frame, LostReason::kUnstablePose);
   const bool after_gap = to_seconds(frame.time_ns - input.state.time_ns) > kMaxPrediction_s;

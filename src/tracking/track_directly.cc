@@ -102,9 +102,9 @@ bool track_coarsely(const TrackInput& input, const LastLandmarks& last, const Tr
   const AlignedLandmarks found = align(input, frame, T_rig_world, candidates, alignment, pool);
   const auto observations = pose_observations(input.map, found.matches, found.aligned);
   const solver::MotionModel motion = motion_model(input, frame);
-  const auto solution =
-      robust_pose(input, frame, found.matches, observations, T_rig_world, motion, options.pose).solution;
-  if (!supported(solution, observations.size(), options.min_inliers, options)) return false;
+  const auto [solution, matches, contest] =
+      robust_pose(input, frame, found.matches, observations, T_rig_world, motion, options.pose);
+  if (!supported(solution, matches, options.min_inliers, options)) return false;
   frame.twist = motion.twist(solution.T_rig_world);
   T_rig_world = solution.T_rig_world;
   return true;
@@ -174,10 +174,11 @@ DirectOutput track_directly(const TrackInput& input, frame::BundledFrame frame, 
   AlignedLandmarks found = align(input, frame, T_rig_world, local.candidates, input.alignment, pool);
   const auto observations = pose_observations(input.map, found.matches, found.aligned);
   const solver::MotionModel motion = motion_model(input, frame);
-  auto [solution, contest] = robust_pose(input, frame, found.matches, observations, T_rig_world, motion, options.pose);
-  if (!enough(solution, observations.size(), options)) return {.failure = DirectFailure::kNoPose};
+  auto [solution, matches, contest] =
+      robust_pose(input, frame, found.matches, observations, T_rig_world, motion, options.pose);
+  if (!enough(solution, matches, options)) return {.failure = DirectFailure::kNoPose};
   const bool doubtful =
-      newly_started(input, frame) && solution.num_inliers < kMinRatioAtStart * static_cast<double>(observations.size());
+      newly_started(input, frame) && solution.num_inliers < kMinRatioAtStart * static_cast<double>(matches);
   frame.twist = motion.twist(solution.T_rig_world);
   frame = with_keypoints(std::move(frame), found);
   TrackedFrame tracked{std::move(frame), std::move(solution), std::move(found.matches), local.expected, contest};
