@@ -307,24 +307,6 @@ bool newly_started(const TrackInput& input, const frame::BundledFrame& frame) {
   return age_s >= 0.0 && age_s < kLongObserved_s;
 }
 
-std::vector<std::uint8_t> agreeing_beyond_chance(const camera::Rig& rig,
-                                                 std::span<const solver::PoseObservation> observations,
-                                                 std::span<const double> window_px, const geometry::SE3& T_rig_world,
-                                                 const solver::MotionModel& motion) {
-  // Minimum number of matches beyond chance, if few are expected by chance.
-  constexpr double kDeviations = 5.0, kLeast = 10.0;
-  const solver::PoseSolution at_pose = solver::solve_pose(rig, observations, T_rig_world, motion, {.rounds = 0});
-  double expected = 0.0, variance = 0.0;
-  for (std::size_t i = 0; i < observations.size(); ++i) {
-    const double deviations = window_px[i] / observations[i].sigma;
-    const double by_chance = std::min(1.0, solver::kChi2TwoDof95 / (deviations * deviations));
-    expected += by_chance;
-    variance += by_chance * (1.0 - by_chance);
-  }
-  const bool beyond = at_pose.num_inliers > expected + std::max(kLeast, kDeviations * std::sqrt(variance));
-  return beyond ? at_pose.inlier : std::vector<std::uint8_t>(observations.size(), 0);
-}
-
 ChosenPose robust_pose(const TrackInput& input, const frame::BundledFrame& frame, const FrameMatches& matches,
                        std::span<const solver::PoseObservation> observations, const geometry::SE3& predicted,
                        const solver::MotionModel& motion, const solver::PoseSolverOptions& options) {

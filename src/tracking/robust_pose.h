@@ -13,14 +13,6 @@ namespace bslam::tracking {
 // Returns true if the map is so new that no landmark can have been observed for a long time.
 bool newly_started(const TrackInput& input, const frame::BundledFrame& frame);
 
-// Flags the matches that agree with a pose, if there are clearly more of them than chance explains; otherwise flags
-// none. A wrong match has a random position in its search window. `window_px`: radius of the window of each observation
-// in level-0 pixels.
-std::vector<std::uint8_t> agreeing_beyond_chance(const camera::Rig& rig,
-                                                 std::span<const solver::PoseObservation> observations,
-                                                 std::span<const double> window_px, const geometry::SE3& T_rig_world,
-                                                 const solver::MotionModel& motion);
-
 // A pose chosen among those of several motions.
 struct ChosenPose {
   solver::PoseSolution solution;

@@ -7,6 +7,7 @@
 #include "frame/rig_at.h"
 #include "tracking/keyframe_decision.h"
 #include "tracking/motion_prediction.h"
+#include "tracking/pose_confirmation.h"
 #include "tracking/robust_pose.h"
 #include "tracking/track_output.h"
 #include "tracking/view_rotation.h"
@@ -25,6 +26,8 @@ struct Coarse {
   // Per camera: landmarks of the last frame that were re-observed; empty if only the wide search succeeded.
   std::vector<LandmarkCounts> reobserved = {};
   MotionContest contest{};
+  // It was found in wide windows, and its inlier ratio is low: landmarks of the local view have to confirm it.
+  bool unconfirmed = false;
 };
 
 bool any(const std::vector<std::uint8_t>& flags) { return std::ranges::find(flags, std::uint8_t{1}) != flags.end(); }
@@ -82,7 +85,8 @@ std::vector<std::uint8_t> exclude_contradicting(const TrackInput& input, const f
   return wrong;
 }
 
-// Pose from landmarks found near their projections at the current estimate. Returns false if there are too few.
+// Pose from landmarks found near their projections at the current estimate. Returns false if there are too few; most of
+// the matches of a pose found in wide windows may be wrong.
 bool track_in_narrow_windows(const TrackInput& input, const std::vector<LandmarkId>& landmarks,
                              const TrackingOptions& options, ThreadPool& pool, Coarse& out) {
   const map::BundledMap& map = input.map;
@@ -99,7 +103,11 @@ bool track_in_narrow_windows(const TrackInput& input, const std::vector<Landmark
       input, frame, found, pose_observations(map, frame, found, input.features), predicted, motion, options.pose);
   const std::vector<std::uint8_t> contradicting =
       exclude_contradicting(input, frame, options, found, excluded, solution);
-  if (!supported(solution, std::min(matches, count(found)), options.min_inliers, options)) return false;
+  const bool few = !supported(solution, std::min(matches, count(found)), options.min_inliers, options);
+  if (few && !(out.unconfirmed && solution.ok && solution.num_inliers >= options.min_inliers_wide &&
+               confirmed_by_matches(input, frame, found, options.matching.predicted_radius, solution.T_rig_world)))
+    return false;
+  out.unconfirmed = few;
   out.contest.add(contest);
   out.frame.twist = motion.twist(solution.T_rig_world);
   out.T_rig_world = solution.T_rig_world;
@@ -138,6 +146,7 @@ bool track_in_wide_windows(const TrackInput& input, const std::vector<LandmarkId
   if (!supported(solution, matches, options.min_inliers_wide, options)) {
     Coarse confirmed = out;
     confirmed.T_rig_world = solution.T_rig_world;
+    confirmed.unconfirmed = true;
     if (!track_in_narrow_windows(input, landmarks, options, pool, confirmed)) return false;
     out = std::move(confirmed);
     return true;
@@ -280,19 +289,18 @@ bool coarse_pose_confirmed(const TrackInput& input, const Coarse& coarse, const 
   constexpr double kMost = 0.5;
   const std::vector<LandmarkId> known = landmarks_of(coarse.matches);
   const auto all = pose_observations(input.map, fine.matches, fine.aligned);
+  const std::vector<double> windows_px = search_windows_px(
+      input.map.rig(), coarse.frame, fine.matches, options.matching.local_radius, input.features.pyramid.scale_factor);
   std::vector<solver::PoseObservation> observations;
   std::vector<double> window_px;
   std::vector<std::size_t> index;
   std::size_t i = 0;
-  for (std::size_t c = 0; c < fine.matches.size(); ++c) {
-    const double radius_px = options.matching.local_radius / input.map.rig().camera(c).radians_per_pixel();
-    for (const Match& m : fine.matches[c]) {
+  for (const auto& of_camera : fine.matches) {
+    for (const Match& m : of_camera) {
       const std::size_t at = i++;
       if (std::ranges::binary_search(known, m.landmark)) continue;
-      // The search radius is scaled by the predicted pyramid level, which may be one below that of the keypoint.
-      const int level = std::max(0, coarse.frame.cameras[c].keypoints.level[m.keypoint.index()] - 1);
       observations.push_back(all[at]);
-      window_px.push_back(radius_px * std::pow(input.features.pyramid.scale_factor, level));
+      window_px.push_back(windows_px[at]);
       index.push_back(at);
     }
   }
@@ -376,8 +384,8 @@ TrackOutput track(const TrackInput& input, const frame::BundledFrame& frame, con
   if (coarse.reason != LostReason::kNone) return lost(input.state, frame, coarse.reason);
   Fine fine = track_local_view(input, coarse, options, pool);
   if (fine.solution.num_inliers < options.min_inliers) return lost(input.state, frame, LostReason::kFewInliers);
-  if (!supported(fine.solution, fine.num_matches, options.min_inliers, options) &&
-      !(fine.solution.ok && coarse_pose_confirmed(input, coarse, fine, options)))
+  const bool enough = supported(fine.solution, fine.num_matches, options.min_inliers, options);
+  if ((!enough || coarse.unconfirmed) && !(fine.solution.ok && coarse_pose_confirmed(input, coarse, fine, options)))
     return lost(input.state, frame, LostReason::kUnstablePose);
   const bool after_gap = to_seconds(frame.time_ns - input.state.time_ns) > kMaxPrediction_s;
   if (after_gap && !lasting_landmarks_found(input.map, fine.visible, fine.matches, fine.solution.inlier))

@@ -6,6 +6,7 @@
 
 #include "estimators/pose_ransac.h"
 #include "tracking/camera_consensus.h"
+#include "tracking/pose_confirmation.h"
 #include "tracking/simulated_tracker.h"
 
 namespace bslam::tracking {
@@ -392,6 +393,18 @@ TEST_F(RobustPose, FewRightMatchesConfirmAPoseAndWrongOnesDoNot) {
   EXPECT_TRUE(confirmed());
   for (std::size_t i = 0; i < observations.size(); i += 4) mislead(i);
   EXPECT_FALSE(confirmed());
+}
+
+// In windows hardly larger than the noise, wrong matches agree as well.
+TEST_F(RobustPose, MatchesConfirmThePoseOnlyInWindowsLargerThanTheNoise) {
+  const TrackerState state = state_at_first(world);
+  const auto confirmed = [&](double radius, const geometry::SE3& T_rig_world) {
+    return confirmed_by_matches({.map = world.map, .pyramids = {}, .alignment = {}, .state = state}, seen.frame,
+                                matches, radius, T_rig_world);
+  };
+  EXPECT_TRUE(confirmed(0.02, truth));
+  EXPECT_FALSE(confirmed(0.02, truth.perturbed((geometry::Vector6d() << 0, 0.1, 0, 0, 0, 0).finished())));
+  EXPECT_FALSE(confirmed(0.001, truth));
 }
 
 }  // namespace
