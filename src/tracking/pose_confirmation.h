@@ -23,7 +23,8 @@ std::vector<std::uint8_t> agreeing_beyond_chance(const camera::Rig& rig,
                                                  std::span<const double> window_px, const geometry::SE3& T_rig_world,
                                                  const solver::MotionModel& motion);
 
-// Returns true if they do for the matches of a frame, which were searched for within `radius`, in radians.
+// Returns true if more matches of a frame agree with its pose than chance explains. `radius`: radians, that of the
+// search which found them.
 bool confirmed_by_matches(const TrackInput& input, const frame::BundledFrame& frame, const FrameMatches& matches,
                           double radius, const geometry::SE3& T_rig_world);
 

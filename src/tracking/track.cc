@@ -227,10 +227,10 @@ bool any_due_for_retry(const TrackerState& state, TimeNs time_ns, const Consensu
 
 struct Fine {
   solver::PoseSolution solution;
-  geometry::Vector6d twist;  // rad/s, map units/s
-  FrameMatches matches;      // inliers and outliers
-  std::size_t num_matches;   // see ChosenPose::matches
-  AlignedMatches aligned;    // for all of `matches`
+  geometry::Vector6d twist;     // rad/s, map units/s
+  FrameMatches matches;         // inliers and outliers
+  std::size_t num_matches = 0;  // see ChosenPose::matches
+  AlignedMatches aligned;       // for all of `matches`
   std::vector<LandmarkId> visible;
   std::vector<LandmarkCounts> views;  // per camera: landmarks of the local view that are expected and found
   std::vector<LandmarkCounts> own;    // of excluded cameras: the same, of landmarks that the camera itself has observed
@@ -289,10 +289,10 @@ bool coarse_pose_confirmed(const TrackInput& input, const Coarse& coarse, const 
   constexpr double kMost = 0.5;
   const std::vector<LandmarkId> known = landmarks_of(coarse.matches);
   const auto all = pose_observations(input.map, fine.matches, fine.aligned);
-  const std::vector<double> windows_px = search_windows_px(
+  const std::vector<double> all_windows_px = search_windows_px(
       input.map.rig(), coarse.frame, fine.matches, options.matching.local_radius, input.features.pyramid.scale_factor);
   std::vector<solver::PoseObservation> observations;
-  std::vector<double> window_px;
+  std::vector<double> windows_px;
   std::vector<std::size_t> index;
   std::size_t i = 0;
   for (const auto& of_camera : fine.matches) {
@@ -300,13 +300,13 @@ bool coarse_pose_confirmed(const TrackInput& input, const Coarse& coarse, const 
       const std::size_t at = i++;
       if (std::ranges::binary_search(known, m.landmark)) continue;
       observations.push_back(all[at]);
-      window_px.push_back(windows_px[at]);
+      windows_px.push_back(all_windows_px[at]);
       index.push_back(at);
     }
   }
   const frame::RigAt resting(input.map.rig(), coarse.frame);
   const auto agrees =
-      agreeing_beyond_chance(*resting, observations, window_px, coarse.T_rig_world, motion_model(input, coarse.frame));
+      agreeing_beyond_chance(*resting, observations, windows_px, coarse.T_rig_world, motion_model(input, coarse.frame));
   int agreeing = 0, of_fine = 0;
   for (std::size_t k = 0; k < agrees.size(); ++k) {
     agreeing += agrees[k];
