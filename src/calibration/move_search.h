@@ -7,7 +7,9 @@
 
 namespace bslam::calibration {
 
-// As estimate_rig, with those of the given moves that the images show, and with further ones that they show.
+// As estimate_rig, with those of the given moves that the images show, and with further ones that they show. Further
+// ones are not searched for as long as the estimate without them is not settled: what looks like moves is then a
+// calibration that was not found, and every estimate with moves takes many iterations.
 RigEstimate estimate_rig_and_moves(const EstimateInput& input, const RigAdjustmentOptions& prior, MovedCameras cameras);
 
 // The moves of an estimate.

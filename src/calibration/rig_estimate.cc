@@ -79,24 +79,26 @@ RigAdjustment adjust_correlated(const EstimateInput& input, RigAdjustmentOptions
 
 // A map built with a wrong calibration contains mostly the observations that agree with it, so adjusting it once stops
 // short of the truth. Therefore the rejected observations are searched again with the new calibration.
-RigAdjustment adjust_in_passes(const EstimateInput& input, RigAdjustmentOptions options, const MovedCameras& cameras,
-                               RigProblem& problem) {
+void adjust_in_passes(const EstimateInput& input, RigAdjustmentOptions options, RigEstimate& estimate) {
   RigAdjustmentOptions coarse = options;
   coarse.relative_decrease = kCoarseDecrease;
-  solver::RigValues before = start_of(input.map, cameras);
-  separate_groups(problem);
-  RigAdjustment out = adjust_correlated(input, coarse, before, problem);
+  solver::RigValues before = start_of(input.map, estimate.cameras);
+  separate_groups(estimate.problem);
+  RigAdjustment out = adjust_correlated(input, coarse, before, estimate.problem);
   options.correlated_observations = coarse.correlated_observations;
-  for (int pass = 1; pass < kPasses && out.done && !converged(out, before); ++pass) {
+  for (int pass = 1; out.done; ++pass) {
+    estimate.settled = converged(out, before);
+    if (estimate.settled || pass == kPasses) break;
     before = out.values;
-    if (recover(input, cameras, before, problem) == 0) break;
-    separate_groups(problem);
-    RigAdjustment again = adjust_rig(problem.selected.problem, coarse, before, input.stop);
+    estimate.settled = recover(input, estimate.cameras, before, estimate.problem) == 0;
+    if (estimate.settled) break;
+    separate_groups(estimate.problem);
+    RigAdjustment again = adjust_rig(estimate.problem.selected.problem, coarse, before, input.stop);
     if (!again.done) break;
     again.scale_change *= out.scale_change;
     out = std::move(again);
   }
-  return out.done ? adjust_weighted(options, std::move(out), problem, input.stop) : out;
+  estimate.adjusted = out.done ? adjust_weighted(options, std::move(out), estimate.problem, input.stop) : out;
 }
 
 }  // namespace
@@ -129,13 +131,13 @@ RigAdjustmentOptions prior_with_timing(const EstimateInput& input, const MovedCa
 }
 
 RigEstimate estimate_rig(const EstimateInput& input, const RigAdjustmentOptions& prior, MovedCameras cameras) {
-  RigEstimate out{std::move(cameras), {}, choose(input.map, !prior.timing.empty(), input.options, input.features), {}};
+  RigEstimate out{std::move(cameras), {}, choose(input.map, !prior.timing.empty(), input.options, input.features)};
   out.reference = std::make_shared<const camera::Rig>(
       out.cameras.added_to(with_time_offsets_of(input.map.rig(), input.calibrated)));
   out.problem.selected.problem.rig = out.reference.get();
   out.cameras.separate(input.map, out.problem);
   out.path_before = path_length(out.problem);
-  out.adjusted = adjust_in_passes(input, out.cameras.added_to(prior), out.cameras, out.problem);
+  adjust_in_passes(input, out.cameras.added_to(prior), out);
   return out;
 }
 

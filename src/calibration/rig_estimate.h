@@ -24,7 +24,10 @@ struct RigEstimate {
   // The given calibration of these cameras, with the time offsets that were applied to the images of the map.
   std::shared_ptr<const camera::Rig> reference;
   RigProblem problem;  // poses and points belong to the estimate
-  RigAdjustment adjusted;
+  RigAdjustment adjusted = {};
+  // False if the extrinsics still changed by more than their uncertainty when rejected observations had been searched
+  // for several times: the calibration is far off, or the images do not belong to it.
+  bool settled = false;
   double path_before = 0;  // path_length() with the rig of the map
 };
 

@@ -3,10 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <numbers>
 
+#include "base/work.h"
 #include "calibration/adjusted_map.h"
+#include "calibration/move_search.h"
 #include "mapping/simulated_map.h"
 
 namespace bslam::calibration::moves {
@@ -203,6 +206,23 @@ TEST(MovedCamera, OfARigOfTwoIsTheSecondOne) {
   const RigRefinement result = refined(map_of(synthetic::ring_rig(2), moved));
   ASSERT_EQ(result.moves.size(), 1u);
   EXPECT_EQ(result.moves[0].camera, 1u);
+}
+
+// A camera that swings on its mount has no constant extrinsics, and no few moves explain its images. Estimates with
+// moves would take many steps in vain.
+TEST(MovedCamera, IsNotSearchedForIfTheEstimateDoesNotSettle) {
+  std::vector<Moved> swings;
+  for (int i = 0; i < kKeyframes; ++i)
+    swings.push_back({1, i, turn({2 * std::sin(1.3 * i), 3 * std::sin(0.7 * i), 2 * std::cos(1.1 * i)})});
+  const map::BundledMap map = map_of(synthetic::default_rig(), swings);
+  const EstimateInput input{map, map.rig(), kIndependent, kFeatures, {}};
+  const MovedCameras none(map.rig().size(), {});
+  const RigAdjustmentOptions prior = prior_with_timing(input, none);
+  const WorkCounts begin = work_so_far();
+  ASSERT_FALSE(estimate_rig(input, prior, none).settled);
+  const WorkCounts constant = work_so_far();
+  EXPECT_TRUE(moves_of(estimate_rig_and_moves(input, prior, none)).empty());
+  EXPECT_EQ((work_so_far() - constant).solver_steps, (constant - begin).solver_steps);
 }
 
 // The problem with moves as further cameras has the same errors as that with moves as motions.
