@@ -63,10 +63,18 @@ constexpr int kMinAgreeing = 60;  // matches
 
 double share(const PairEvidence& e) { return e.matches > 0 ? 1.0 * e.agreeing[0] / e.matches : 0.0; }
 
-// Returns the shift of the second camera of the pair; nullopt if images of the same frame fit as well.
-std::optional<LateCamera> judge(const camera::Rig& rig, std::size_t i, std::size_t j,
+// The calibration as given, and as estimated from the images of the run; without an estimate, the same one.
+struct Calibrations {
+  const camera::Rig &given, &estimated;
+};
+
+// Returns the shift of the second camera of the pair; nullopt if images of the same frame fit as well, with the given
+// or the estimated calibration. With a wrong rotation, images that are one frame apart may fit better while the rig
+// turns steadily.
+std::optional<LateCamera> judge(const Calibrations& calibrations, std::size_t i, std::size_t j,
                                 const std::vector<std::vector<View>>& views, const Part& part) {
   constexpr double kClearly = 1.3, kMuchLarger = 0.15;
+  const camera::Rig& rig = calibrations.given;
   const PairEvidence same = compare(rig, i, j, views, part, 1);
   if (same.matches < kMinAgreeing) return std::nullopt;
   std::optional<LateCamera> out;
@@ -84,7 +92,9 @@ std::optional<LateCamera> judge(const camera::Rig& rig, std::size_t i, std::size
                      .matches_apart = apart.matches,
                      .agreeing_apart = apart.agreeing[0]};
   }
-  return out;
+  if (!out || &calibrations.estimated == &rig) return out;
+  const PairEvidence estimated = compare(calibrations.estimated, i, j, views, part, 1);
+  return estimated.agreeing[0] < out->agreeing_apart ? out : std::nullopt;
 }
 
 // Returns true if images of the same frame fit outside of the part, as expected if the camera lost a frame, or caught
@@ -100,14 +110,15 @@ bool fits_elsewhere(const camera::Rig& rig, const LateCamera& late, const std::v
 }
 
 // The camera that most pairs show to be late in a part of the triples.
-std::optional<LateCamera> find_in_part(const camera::Rig& rig, const std::vector<std::vector<View>>& views,
+std::optional<LateCamera> find_in_part(const Calibrations& calibrations, const std::vector<std::vector<View>>& views,
                                        const Part& part) {
+  const camera::Rig& rig = calibrations.given;
   std::vector<LateCamera> found;
   std::vector<int> votes(rig.size(), 0);
   for (std::size_t i = 0; i < rig.size(); ++i) {
     for (std::size_t j = i + 1; j < rig.size(); ++j) {
       if (std::max(rig.overlap_share(i, j), rig.overlap_share(j, i)) < kSomeOverlap) continue;
-      const auto late = judge(rig, i, j, views, part);
+      const auto late = judge(calibrations, i, j, views, part);
       if (!late) continue;
       found.push_back(*late);
       ++votes[i];
@@ -129,7 +140,8 @@ std::optional<LateCamera> find_in_part(const camera::Rig& rig, const std::vector
 
 }  // namespace
 
-std::optional<LateCamera> find_late_camera(const camera::Rig& rig, std::span<const image::ImageBundle> triples,
+std::optional<LateCamera> find_late_camera(const camera::Rig& rig, const camera::Rig& estimated,
+                                           std::span<const image::ImageBundle> triples,
                                            std::span<const image::Image> masks) {
   const std::vector<std::vector<View>> views = views_taken_together(rig, triples, masks);
   const std::size_t count = views.front().size() / kTriple;
@@ -141,7 +153,7 @@ std::optional<LateCamera> find_late_camera(const camera::Rig& rig, std::span<con
                                       {"first quarter", 0, count / 4},
                                       {"last quarter", count - count / 4, count}}};
   for (const Part& part : parts) {
-    auto found = find_in_part(rig, views, part);
+    auto found = find_in_part({rig, estimated}, views, part);
     if (found && (part.name.empty() || fits_elsewhere(rig, *found, views, part))) return found;
   }
   return std::nullopt;

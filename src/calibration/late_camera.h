@@ -27,8 +27,11 @@ struct LateCamera {
 // frames, of which those with images that were not taken at the same time do not count. A shift can only be found if
 // the rig moves between frames, and if half of the triples count. If several pairs of cameras show a difference, the
 // camera of most of them is returned. If the triples together show none, their halves and quarters at the ends are
-// tested. `masks` as in check_conventions.
-std::optional<LateCamera> find_late_camera(const camera::Rig& rig, std::span<const image::ImageBundle> triples,
+// tested. `estimated`: the calibration that was estimated from the same recording, with the cameras of `rig`, or `rig`
+// itself; with a wrong rotation, images that are one frame apart may fit better than those of the same frame while the
+// rig turns steadily, but not better than those of the same frame with the estimate. `masks` as in check_conventions.
+std::optional<LateCamera> find_late_camera(const camera::Rig& rig, const camera::Rig& estimated,
+                                           std::span<const image::ImageBundle> triples,
                                            std::span<const image::Image> masks);
 
 // A warning that names the camera.

@@ -59,7 +59,7 @@ Result<std::vector<calibration::PairEvidence>> test_against_images(const dataset
   return calibration::check_conventions(dataset.rig, frames, *masks);
 }
 
-std::optional<calibration::LateCamera> late_camera(const dataset::Dataset& dataset) {
+std::optional<calibration::LateCamera> late_camera(const dataset::Dataset& dataset, const camera::Rig& estimated) {
   constexpr std::size_t kTriples = 12;
   const auto masks = image_decoding::read_masks(dataset.rig);
   const std::size_t size = dataset.frames.size();
@@ -70,7 +70,7 @@ std::optional<calibration::LateCamera> late_camera(const dataset::Dataset& datas
     const std::size_t first = (2 * t + 1) * (size - 2) / (2 * count);
     for (std::size_t f = 0; f < 3; ++f) triples.push_back(dataset::read_frame(dataset, first + f));
   }
-  return calibration::find_late_camera(dataset.rig, triples, *masks);
+  return calibration::find_late_camera(dataset.rig, estimated, triples, *masks);
 }
 
 PairsWithoutMap pairs_without_map(const dataset::Dataset& dataset) {

@@ -15,8 +15,8 @@ namespace bslam::session {
 Result<std::vector<calibration::PairEvidence>> test_against_images(const dataset::Dataset& dataset);
 
 // The camera whose images are one frame late, in the whole data set or in a half or quarter at one of its ends; found
-// with some frames spread over it that follow each other.
-std::optional<calibration::LateCamera> late_camera(const dataset::Dataset& dataset);
+// with some frames spread over it that follow each other. `estimated` as in find_late_camera.
+std::optional<calibration::LateCamera> late_camera(const dataset::Dataset& dataset, const camera::Rig& estimated);
 
 // The result of testing a calibration against some images, if no map was started with it or most frames were lost.
 struct PairsWithoutMap {

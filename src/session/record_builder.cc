@@ -117,7 +117,7 @@ void add_calibration(const RecordInput& input, RunRecord& record) {
     if (inconsistent_fraction(record.cameras[c]) > 0.5) calibration.disagreeing.push_back(c);
   }
   if (input.complete && (is_contradicted(calibration) || std::ranges::any_of(record.cameras, was_inconsistent)))
-    calibration.late = late_camera(input.dataset);
+    calibration.late = late_camera(input.dataset, input.system.rig());
   calibration.accept_estimate(input.complete, input.system.calibration_refined());
   for (CameraRecord& camera : record.cameras) {
     if (camera.extrinsics) camera.extrinsics->refined = calibration.refined;

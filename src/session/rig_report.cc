@@ -181,7 +181,7 @@ Result<ImageEvidence> check_against_images(const RigReportRequest& request, bool
   if (!dataset) return dataset.error();
   auto pairs = test_against_images(*dataset);
   if (!pairs) return pairs.error();
-  return ImageEvidence{*std::move(pairs), late_camera(*dataset)};
+  return ImageEvidence{*std::move(pairs), late_camera(*dataset, dataset->rig)};
 }
 
 }  // namespace

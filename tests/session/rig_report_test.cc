@@ -226,8 +226,8 @@ TEST_F(RigReport, ACameraThatBecomesLateIsFound) {
     if (k >= 3 * kTriples / 2) late.back().images[1].image = dataset::read_frame(*data, k + 1).images[1].image;
   }
   const std::vector<image::Image> masks(2);
-  EXPECT_FALSE(calibration::find_late_camera(data->rig, right, masks));
-  const auto found = calibration::find_late_camera(data->rig, late, masks);
+  EXPECT_FALSE(calibration::find_late_camera(data->rig, data->rig, right, masks));
+  const auto found = calibration::find_late_camera(data->rig, data->rig, late, masks);
   ASSERT_TRUE(found);
   EXPECT_EQ(found->part, "last half");
   EXPECT_TRUE(found->early);
@@ -235,11 +235,11 @@ TEST_F(RigReport, ACameraThatBecomesLateIsFound) {
   // Some images have wrong time stamps.
   constexpr TimeNs kWrong = 60'000'000;
   late.front().images[1].time_ns += kWrong;
-  const auto despite = calibration::find_late_camera(data->rig, late, masks);
+  const auto despite = calibration::find_late_camera(data->rig, data->rig, late, masks);
   ASSERT_TRUE(despite);
   EXPECT_TRUE(despite->early);
   for (std::size_t k = 0; k < late.size(); k += 3) late[k].images[1].time_ns += kWrong;
-  EXPECT_FALSE(calibration::find_late_camera(data->rig, late, masks));
+  EXPECT_FALSE(calibration::find_late_camera(data->rig, data->rig, late, masks));
 }
 
 }  // namespace
