@@ -14,6 +14,10 @@
 namespace bslam::map_export {
 namespace {
 
+// The image of a keyframe shows at least 98 % of its keypoints, also if it was compressed since then, and an image from
+// a few centimetres beside it at most 52 %.
+constexpr double kMostly = 0.75;
+
 struct RecordedImage {
   const image_files::ImageFile* image;
   std::size_t camera;  // index in the recording
@@ -100,18 +104,49 @@ bool any_twice(std::vector<const RecordedImage*> found) {
   return std::ranges::adjacent_find(found) != found.end();
 }
 
-// Of several recordings with the same time stamps: keeps what was found for the images of the map which show the
-// keypoints of their keyframes, and each image only once.
+// How much of the keypoints of an image of the map the image of the recording shows (share_shown).
+std::optional<double> shown(const map::BundledMap& map, const dataset::Dataset& data, const MapImage& image,
+                            const RecordedImage& recorded) {
+  const auto pixels = image_decoding::read_image(*recorded.image, format_of(data, recorded.camera));
+  const camera::Camera& camera = map.rig().camera(image.camera);
+  if (!pixels || pixels->width() != camera.width || pixels->height() != camera.height) return 0;
+  return share_shown(*pixels, map.keypoints(image.keyframe, CameraIndex(image.camera)), map.pyramid());
+}
+
+// Whether a few of the images that were found, distributed over all, show their keyframes. Otherwise some are of
+// another recording with the same time stamps.
+bool sample_is_shown(const map::BundledMap& map, const dataset::Dataset* data, const std::vector<MapImage>& images,
+                     const std::vector<const RecordedImage*>& found) {
+  constexpr std::size_t kSample = 12;
+  std::vector<std::size_t> with_image;
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    if (found[i]) with_image.push_back(i);
+  }
+  const std::size_t count = std::min(kSample, with_image.size());
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::size_t i = with_image[(2 * k + 1) * with_image.size() / (2 * count)];
+    if (shown(map, *data, images[i], *found[i]).value_or(1) < kMostly) return false;
+  }
+  return true;
+}
+
+// If recordings have the same time stamps: keeps what was found for the images of the map which show most of the
+// keypoints of their keyframes, and each image only for the keyframe of which it shows most.
 void keep_shown(const map::BundledMap& map, const dataset::Dataset& data, const std::vector<MapImage>& images,
                 std::vector<const RecordedImage*>& found) {
-  std::set<const RecordedImage*> taken;
+  std::vector<double> share(images.size(), 0);
+  std::map<const RecordedImage*, std::size_t> best;
   for (std::size_t i = 0; i < images.size(); ++i) {
     if (!found[i]) continue;
-    const auto pixels = image_decoding::read_image(*found[i]->image, format_of(data, found[i]->camera));
-    const camera::Camera& camera = map.rig().camera(images[i].camera);
-    const bool same = pixels && pixels->width() == camera.width && pixels->height() == camera.height &&
-                      shows(*pixels, map.keypoints(images[i].keyframe, CameraIndex(images[i].camera)), map.pyramid());
-    if (!same || !taken.insert(found[i]).second) found[i] = nullptr;
+    share[i] = shown(map, data, images[i], *found[i]).value_or(0);
+    if (share[i] < kMostly) {
+      found[i] = nullptr;
+      continue;
+    }
+    const auto [other, first] = best.try_emplace(found[i], i);
+    if (first) continue;
+    const std::size_t worse = share[i] > share[other->second] ? std::exchange(other->second, i) : i;
+    found[worse] = nullptr;
   }
 }
 
@@ -148,7 +183,8 @@ ImageTable::ImageTable(const Selection& selection, const dataset::Dataset* data,
       found.push_back(recorded.at(c, stamp_ns));
     }
   }
-  if (any_twice(found)) keep_shown(*selection.map, *data, images_, found);
+  if (any_twice(found) || !sample_is_shown(*selection.map, data, images_, found))
+    keep_shown(*selection.map, *data, images_, found);
   for (std::size_t i = 0; i < images_.size(); ++i) {
     if (!found[i]) continue;
     const std::filesystem::path& path = found[i]->image->path;

@@ -24,9 +24,9 @@ class ImageTable {
  public:
   // Lists the present images of all cameras, in order of keyframe and camera. `data` is the recording of the map, or
   // null: images that are not files of it are named CAMERA/STAMP.png, with the time stamp in ns. CAMERA is the name of
-  // the camera with "_" for slashes and control characters, and unlike those of the other cameras. If the map is of
-  // several recordings with the same time stamps, images belong to the keyframes whose keypoints they show, and names
-  // that would occur twice end in _2 and so on.
+  // the camera with "_" for slashes and control characters, and unlike those of the other cameras. If recordings have
+  // the same time stamps, several of the map or another one, images belong to the keyframes whose keypoints they show,
+  // and names that would occur twice end in _2 and so on.
   ImageTable(const Selection& selection, const dataset::Dataset* data, const std::filesystem::path& root);
 
   const std::vector<MapImage>& images() const { return images_; }

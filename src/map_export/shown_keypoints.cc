@@ -13,8 +13,8 @@ namespace {
 
 constexpr std::size_t kSample = 200;
 // Bits of 256; positions have been refined since the descriptors were computed. Unrelated descriptors differ in 128 on
-// average, and hardly ever in so few.
-constexpr int kSimilar = 64;
+// average; those of one corner from slightly different places often in more than this.
+constexpr int kSimilar = 32;
 
 // Whether a window around a position is within an image.
 bool has_window(const image::Image& image, double x, double y) {
@@ -24,7 +24,8 @@ bool has_window(const image::Image& image, double x, double y) {
 
 }  // namespace
 
-bool shows(const image::Image& image, const feature::Keypoints& keypoints, const feature::PyramidShape& shape) {
+std::optional<double> share_shown(const image::Image& image, const feature::Keypoints& keypoints,
+                                  const feature::PyramidShape& shape) {
   image::Pyramid pyramid;
   image::build_pyramid(image.view(), shape.levels, shape.scale_factor, pyramid);
   feature::Smoother smoother;
@@ -44,7 +45,8 @@ bool shows(const image::Image& image, const feature::Keypoints& keypoints, const
     similar += feature::hamming(here, keypoints.descriptor[i]) <= kSimilar;
     ++compared;
   }
-  return compared > 0 && 4 * similar >= compared;
+  if (compared == 0) return std::nullopt;
+  return static_cast<double>(similar) / static_cast<double>(compared);
 }
 
 }  // namespace bslam::map_export

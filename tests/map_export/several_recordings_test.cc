@@ -22,27 +22,28 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Rectangles of random size, place and brightness.
-void write_scene(const fs::path& file, const camera::Camera& camera, std::uint64_t seed) {
+// Rectangles of random size, place and brightness, moved to the right by some pixels.
+void write_scene(const fs::path& file, const camera::Camera& camera, std::uint64_t seed, int moved) {
   fs::create_directories(file.parent_path());
   Random random(seed);
   cv::Mat image(camera.height, camera.width, CV_8UC1, cv::Scalar(100));
   const auto below = [&random](int n) { return static_cast<int>(random.below(static_cast<std::uint32_t>(n))); };
   for (int i = 0; i < 400; ++i) {
-    const cv::Rect box(below(camera.width), below(camera.height), 8 + below(60), 8 + below(60));
+    const cv::Rect box(moved + below(camera.width), below(camera.height), 8 + below(60), 8 + below(60));
     image(box & cv::Rect(0, 0, camera.width, camera.height)).setTo(below(256));
   }
   ASSERT_TRUE(cv::imwrite(file.string(), image));
 }
 
-// Recordings r0, r1 and r2 of one camera, with images at the same times, of which the map contains r0 and r1.
+// Recordings r0, r1 and r2 of one camera, with images at the same times, of which the map contains r0 and r1. Their
+// images are from nearly the same places.
 class SeveralRecordings : public testing::Test {
  protected:
   static constexpr int kImages = 3;
 
   SeveralRecordings() : rig_(synthetic::ring_rig(1)), map_(std::make_shared<const camera::Rig>(rig_)) {
     for (int r = 0; r < 3; ++r) {
-      for (int i = 0; i < kImages; ++i) write_scene(file(r, i), rig_.camera(0), static_cast<std::uint64_t>(10 * r + i));
+      for (int i = 0; i < kImages; ++i) write_scene(file(r, i), rig_.camera(0), static_cast<std::uint64_t>(i), 4 * r);
     }
     for (int r = 0; r < 2; ++r) {
       for (int i = 0; i < kImages; ++i) add_keyframe(r, i);
@@ -98,6 +99,19 @@ TEST_F(SeveralRecordings, ImagesBelongToTheKeyframesWhoseKeypointsTheyShow) {
       EXPECT_EQ(image.name.starts_with(fmt::format("r{}/", r)), own) << image.name;
     }
     EXPECT_EQ(names.size(), images.images().size());
+  }
+}
+
+TEST_F(SeveralRecordings, ImagesOfAnotherRecordingAreNotThoseOfAMapOfOne) {
+  map::BundledMap one(std::make_shared<const camera::Rig>(rig_));
+  for (int i = 0; i < kImages; ++i) {
+    const map::BundledKeyframe& keyframe = map_.keyframe(KeyframeId(static_cast<std::size_t>(i)));
+    one.add_keyframe(keyframe.frame, keyframe.T_rig_world, {}, i == 0 ? KeyframeId() : KeyframeId(0));
+  }
+  const Selection selection = select_submap(one, 0).value();
+  for (int r = 0; r < 3; ++r) {
+    const dataset::Dataset data = recording(r);
+    EXPECT_EQ(ImageTable(selection, &data, root()).found(), r == 0 ? std::size_t{kImages} : 0u) << r;
   }
 }
 
