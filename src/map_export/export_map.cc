@@ -137,7 +137,8 @@ Result<ExportReport> export_map(const map::BundledMap& map, const ExportRequest&
     if (!status) return status.error();
   auto selection = select_submap(map, request.submap, request.up);
   if (!selection) return selection.error();
-  ImageTable images(*selection, request.data, request.data_folder);
+  ImageTable images(*selection, request.data, request.data_folder, request.interrupted);
+  if (Status s = not_interrupted(request.interrupted); !s) return s.error();
   Exporter exporter{request, *std::move(selection), std::move(images), OutputCameras(map.rig(), request.undistort), {}};
   if (Status s = check_images(exporter); !s) return s.error();
   const std::size_t submaps = map.roots().size();

@@ -104,26 +104,28 @@ bool any_twice(std::vector<const RecordedImage*> found) {
   return std::ranges::adjacent_find(found) != found.end();
 }
 
-// How much of the keypoints of an image of the map the image of the recording shows (share_shown).
+// How much of the keypoints of an image of the map the image of the recording shows (share_shown); nullopt if it cannot
+// be read.
 std::optional<double> shown(const map::BundledMap& map, const dataset::Dataset& data, const MapImage& image,
                             const RecordedImage& recorded) {
   const auto pixels = image_decoding::read_image(*recorded.image, format_of(data, recorded.camera));
   const camera::Camera& camera = map.rig().camera(image.camera);
-  if (!pixels || pixels->width() != camera.width || pixels->height() != camera.height) return 0;
+  if (!pixels) return std::nullopt;
+  if (pixels->width() != camera.width || pixels->height() != camera.height) return 0;
   return share_shown(*pixels, map.keypoints(image.keyframe, CameraIndex(image.camera)), map.pyramid());
 }
 
 // Whether a few of the images that were found, distributed over all, show their keyframes. Otherwise some are of
 // another recording with the same time stamps.
 bool sample_is_shown(const map::BundledMap& map, const dataset::Dataset* data, const std::vector<MapImage>& images,
-                     const std::vector<const RecordedImage*>& found) {
+                     const std::vector<const RecordedImage*>& found, const std::stop_token& stop) {
   constexpr std::size_t kSample = 12;
   std::vector<std::size_t> with_image;
   for (std::size_t i = 0; i < images.size(); ++i) {
     if (found[i]) with_image.push_back(i);
   }
   const std::size_t count = std::min(kSample, with_image.size());
-  for (std::size_t k = 0; k < count; ++k) {
+  for (std::size_t k = 0; k < count && !stop.stop_requested(); ++k) {
     const std::size_t i = with_image[(2 * k + 1) * with_image.size() / (2 * count)];
     if (shown(map, *data, images[i], *found[i]).value_or(1) < kMostly) return false;
   }
@@ -133,10 +135,10 @@ bool sample_is_shown(const map::BundledMap& map, const dataset::Dataset* data, c
 // If recordings have the same time stamps: keeps what was found for the images of the map which show most of the
 // keypoints of their keyframes, and each image only for the keyframe of which it shows most.
 void keep_shown(const map::BundledMap& map, const dataset::Dataset& data, const std::vector<MapImage>& images,
-                std::vector<const RecordedImage*>& found) {
+                std::vector<const RecordedImage*>& found, const std::stop_token& stop) {
   std::vector<double> share(images.size(), 0);
   std::map<const RecordedImage*, std::size_t> best;
-  for (std::size_t i = 0; i < images.size(); ++i) {
+  for (std::size_t i = 0; i < images.size() && !stop.stop_requested(); ++i) {
     if (!found[i]) continue;
     share[i] = shown(map, data, images[i], *found[i]).value_or(0);
     if (share[i] < kMostly) {
@@ -167,7 +169,8 @@ void make_unique(std::vector<MapImage>& images) {
 
 }  // namespace
 
-ImageTable::ImageTable(const Selection& selection, const dataset::Dataset* data, const std::filesystem::path& root)
+ImageTable::ImageTable(const Selection& selection, const dataset::Dataset* data, const std::filesystem::path& root,
+                       const std::stop_token& stop)
     : cameras_(selection.map->rig().size()), number_(selection.map->keyframe_slots() * cameras_, -1) {
   const camera::Rig& rig = selection.map->rig();
   const RecordedImages recorded(*selection.map, data);
@@ -183,8 +186,8 @@ ImageTable::ImageTable(const Selection& selection, const dataset::Dataset* data,
       found.push_back(recorded.at(c, stamp_ns));
     }
   }
-  if (any_twice(found) || !sample_is_shown(*selection.map, data, images_, found))
-    keep_shown(*selection.map, *data, images_, found);
+  if (any_twice(found) || !sample_is_shown(*selection.map, data, images_, found, stop))
+    keep_shown(*selection.map, *data, images_, found, stop);
   for (std::size_t i = 0; i < images_.size(); ++i) {
     if (!found[i]) continue;
     const std::filesystem::path& path = found[i]->image->path;

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -26,8 +27,9 @@ class ImageTable {
   // null: images that are not files of it are named CAMERA/STAMP.png, with the time stamp in ns. CAMERA is the name of
   // the camera with "_" for slashes and control characters, and unlike those of the other cameras. If recordings have
   // the same time stamps, several of the map or another one, images belong to the keyframes whose keypoints they show,
-  // and names that would occur twice end in _2 and so on.
-  ImageTable(const Selection& selection, const dataset::Dataset* data, const std::filesystem::path& root);
+  // and names that would occur twice end in _2 and so on. After a stop, the images that were not read yet may be wrong.
+  ImageTable(const Selection& selection, const dataset::Dataset* data, const std::filesystem::path& root,
+             const std::stop_token& stop = {});
 
   const std::vector<MapImage>& images() const { return images_; }
   // Number of the image of a camera of a keyframe; -1 if it is missing.

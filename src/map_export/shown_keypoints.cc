@@ -22,6 +22,15 @@ bool has_window(const image::Image& image, double x, double y) {
   return x >= kMargin && y >= kMargin && x < image.width() - 1 - kMargin && y < image.height() - 1 - kMargin;
 }
 
+bool is_uniform(const feature::Window& window) {
+  for (int row = 0; row < feature::kWindowRows; ++row) {
+    const auto first = window.begin() + row * feature::kWindowStride;
+    if (!std::all_of(first, first + feature::kWindowRows, [&](std::uint8_t grey) { return grey == window.front(); }))
+      return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 std::optional<double> share_shown(const image::Image& image, const feature::Keypoints& keypoints,
@@ -41,6 +50,7 @@ std::optional<double> share_shown(const image::Image& image, const feature::Keyp
     if (smooth[level].empty()) smoother.smooth(pyramid.levels[level].view(), smooth[level]);
     const feature::Window window =
         feature::sample_window(smooth[level].view(), static_cast<float>(x), static_cast<float>(y));
+    if (is_uniform(window)) continue;
     const feature::Descriptor here = describer.describe(window, keypoints.angle[i]);
     similar += feature::hamming(here, keypoints.descriptor[i]) <= kSimilar;
     ++compared;
