@@ -1,5 +1,6 @@
 #include "system/localiser.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <stdexcept>
 #include <utility>
@@ -81,6 +82,26 @@ class PlacesOfThread final : public looping::PlaceRecogniser {
   const std::shared_ptr<looping::PlaceRecogniser> places_;
 };
 
+// The frame with the image of this camera only.
+image::ImageBundle with_one_image(const image::ImageBundle& images, std::size_t camera) {
+  image::ImageBundle out;
+  out.time_ns = images.time_ns;
+  out.images.resize(images.images.size());
+  out.images[camera] = images.images[camera];
+  return out;
+}
+
+// Whether two poses of frames that were located in the map differ by more than their errors explain. The deviations of
+// the poses do not include the errors of the calibration.
+bool differ(const map::BundledMap& map, const tracking::TrackResult& a, const tracking::TrackResult& b) {
+  constexpr double kMaxSigmas = 10;
+  if (map.root_of(a.anchored.reference) != map.root_of(b.anchored.reference)) return true;
+  if (!a.covariance || !b.covariance) return false;
+  const geometry::Vector6d difference = (a.T_rig_world * b.T_rig_world.inverse()).log();
+  const geometry::Matrix6d covariance = *a.covariance + *b.covariance;
+  return difference.dot(covariance.ldlt().solve(difference)) > kMaxSigmas * kMaxSigmas;
+}
+
 }  // namespace
 
 Localiser::Localiser(camera::Rig rig, const Config& config, map::BundledMap map, place::VocabularyPtr vocabulary,
@@ -95,20 +116,52 @@ Localiser::Localiser(camera::Rig rig, const Config& config, map::BundledMap map,
   places_->query_frame(*map_, frame::BundledFrame());  // computes the index
 }
 
-Result<tracking::FrameRecord> Localiser::localise(const image::ImageBundle& images) const {
-  if (const Status valid = check_frame(images, run_rig_, std::nullopt); !valid) return valid.error();
+// The record of a frame, of the cameras of the run.
+tracking::FrameRecord Localiser::located(const image::ImageBundle& images) const {
   FixedMap map(map_);
   auto relocaliser = std::make_unique<PlaceRelocaliser>(std::make_unique<PlacesOfThread>(places_), config_);
   Pipeline pipeline(rig_, cameras_, config_, masks_, std::move(relocaliser), nullptr);
   Pipeline::Outcome outcome = pipeline.process(widened(images, cameras_, rig_.size()), map);
   narrow(outcome.record, cameras_);
-  tracking::TrackResult& result = outcome.record.result;
+  return std::move(outcome.record);
+}
+
+// A camera with far fewer inliers than another one may look elsewhere or be covered, but it may also have the image of
+// another camera or time: then its image alone is found in the map, at another pose. Unless more cameras support the
+// pose than agree on another one, it may be as wrong as it is certain.
+bool Localiser::located_elsewhere(const image::ImageBundle& images, const tracking::TrackResult& result) const {
+  constexpr int kFewer = 3;
+  int most = 0;
+  std::ptrdiff_t supporting = 0, contradicting = 0;
+  for (const tracking::CameraCounts& camera : result.cameras) most = std::max(most, camera.inliers);
+  std::vector<tracking::TrackResult> others;
+  for (std::size_t c = 0; c < result.cameras.size(); ++c) {
+    if (images.images[c].state != image::ImageState::kPresent) continue;
+    if (kFewer * result.cameras[c].inliers > most) {
+      ++supporting;
+      continue;
+    }
+    const tracking::TrackResult alone = located(with_one_image(images, c)).result;
+    if (alone.status == tracking::TrackStatus::kTracking && differ(*map_, alone, result)) others.push_back(alone);
+  }
+  for (const tracking::TrackResult& other : others) {
+    contradicting = std::max(contradicting, std::ranges::count_if(others, [&](const tracking::TrackResult& another) {
+                               return !differ(*map_, other, another);
+                             }));
+  }
+  return !others.empty() && contradicting >= supporting;
+}
+
+Result<tracking::FrameRecord> Localiser::localise(const image::ImageBundle& images) const {
+  if (const Status valid = check_frame(images, run_rig_, std::nullopt); !valid) return valid.error();
+  tracking::FrameRecord record = located(images);
+  tracking::TrackResult& result = record.result;
   if (result.status == tracking::TrackStatus::kTracking &&
-      std::ranges::any_of(result.cameras, tracking::contradicts_pose)) {
+      (std::ranges::any_of(result.cameras, tracking::contradicts_pose) || located_elsewhere(images, result))) {
     result.status = tracking::TrackStatus::kLost;
     result.reason = tracking::LostReason::kUnstablePose;
   }
-  return std::move(outcome.record);
+  return record;
 }
 
 }  // namespace bslam::system

@@ -25,14 +25,18 @@ class Localiser {
             std::vector<image::Image> masks = {});
 
   // The pose of a frame, which depends on its images and their times only. `images`: one entry per camera of the rig;
-  // images may be missing. A frame that is not found in the map is lost, with the reason. Errors: see check_frame in
-  // system/input_check.h.
+  // images may be missing. A frame that is not found in the map is lost, with the reason, as is one of which an image
+  // contradicts the pose, or as many images as support it are found at another pose if they are located alone. Errors:
+  // see check_frame in system/input_check.h.
   Result<tracking::FrameRecord> localise(const image::ImageBundle& images) const;
 
   const camera::Rig& rig() const { return run_rig_; }
   const map::BundledMap& map() const { return *map_; }
 
  private:
+  tracking::FrameRecord located(const image::ImageBundle& images) const;
+  bool located_elsewhere(const image::ImageBundle& images, const tracking::TrackResult& result) const;
+
   const camera::Rig run_rig_;  // rig of the run, as given
   const Config config_;
   const CamerasOfRun cameras_;  // in rig_

@@ -145,6 +145,19 @@ class Serve(unittest.TestCase):
             self.assertIsNone(answer['T_world_cam0'])
             self.assertIsNone(answer['covariance'])
 
+    def test_images_under_wrong_names_have_no_pose_unless_most_cameras_agree(self):
+        server = self.serve()
+        names = CAMERAS[:2]
+        for stamp, images in self.frames.items():
+            pair = [content for _, content in images[:2]]
+            for contents in (reversed(pair), [pair[0], pair[0]]):
+                answer = json.loads(server.localise(list(zip(names, contents)))[2])
+                self.assertFalse(answer['localised'], answer)
+            exchanged = images[:2] + [(images[2][0], images[3][1]), (images[3][0], images[2][1])]
+            answer = json.loads(server.localise(exchanged)[2])
+            if answer['localised']:
+                self.check_pose(json.dumps(answer), stamp)
+
     def requests(self):
         """Bodies of all kinds."""
         out = []
