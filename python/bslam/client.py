@@ -11,6 +11,7 @@ import http.client
 import json
 import os
 import pathlib
+import re
 import secrets
 import urllib.parse
 from collections.abc import Mapping
@@ -22,6 +23,8 @@ from numpy.typing import NDArray
 
 # The usual port of each kind of address; without a scheme that of `bslam serve`.
 _PORTS = {"": 8090, "http": 80, "https": 443}
+
+_NOT_IN_HEADERS = re.compile("[\x00-\x08\x0a-\x1f\x7f\ud800-\udfff]")
 
 # Pixels as (height, width) uint8, an encoded image, or the file of one.
 Image = Union[NDArray[np.uint8], bytes, str, "os.PathLike[str]"]
@@ -93,6 +96,14 @@ def _form(images: Mapping[str, Image]) -> tuple[str, bytes]:
     return f"multipart/form-data; boundary={boundary}", b"".join(parts) + f"--{boundary}--\r\n".encode()
 
 
+def _authorization(token: str) -> dict[str, bytes]:
+    """The header with the token, whose bytes the server compares with those of its option."""
+    token = token.strip()
+    if other := _NOT_IN_HEADERS.search(token):  # the token itself is secret
+        raise ValueError(f"token: found the character {other[0]!r}, expected one line of text, as after --token")
+    return {"Authorization": b"Bearer " + token.encode()} if token else {}
+
+
 def _pose(value: dict[str, Any] | None) -> NDArray[np.float64] | None:
     return None if value is None else np.array(value["matrix"], dtype=np.float64)
 
@@ -107,7 +118,7 @@ class Client:
             address: as the server prints it, such as "http://127.0.0.1:8090"; or that of a proxy before it, such as
                 "https://robot.example/map". The port is 80 for http://, 443 for https://, and 8090 without either,
                 unless it is given.
-            token: that of the option --token.
+            token: that of the option --token, such as the content of a file: white space around it is ignored.
             timeout: seconds without progress after which a request fails.
         """
         parts = urllib.parse.urlsplit(address if "://" in address else f"//{address}")
@@ -116,7 +127,7 @@ class Client:
         self._encrypted = parts.scheme == "https"
         self._host, self._port, self._timeout = parts.hostname, parts.port or _PORTS[parts.scheme], timeout
         self._folder = parts.path.rstrip("/")
-        self._headers = {"Authorization": f"Bearer {token}"} if token else {}
+        self._headers = _authorization(token)
 
     def localise(self, images: Mapping[str, Image]) -> Localisation:
         """The pose of images that were taken at the same time.
@@ -154,8 +165,9 @@ class Client:
         self, method: str, path: str, body: bytes = b"", headers: Mapping[str, str] | None = None
     ) -> dict[str, Any]:
         """The answer, which is an object of JSON."""
+        text = self._request(method, path, body, headers)
         try:
-            answer = json.loads(self._request(method, path, body, headers))
+            answer = json.loads(text)
         except ValueError as error:
             raise self._not_of_bslam() from error
         if not isinstance(answer, dict):
@@ -168,7 +180,7 @@ class Client:
         try:
             response = _response(connection, method, self._folder + path, body, {**self._headers, **(headers or {})})
             answer = response.read()
-        except (OSError, http.client.HTTPException) as error:
+        except (OSError, http.client.HTTPException, UnicodeError) as error:  # of the address
             raise ServiceError(f"{self._address}: {error}") from error
         finally:
             connection.close()
@@ -178,7 +190,7 @@ class Client:
 
 
 def _response(
-    connection: http.client.HTTPConnection, method: str, path: str, body: bytes, headers: Mapping[str, str]
+    connection: http.client.HTTPConnection, method: str, path: str, body: bytes, headers: Mapping[str, str | bytes]
 ) -> http.client.HTTPResponse:
     try:
         connection.request(method, path, body, headers)

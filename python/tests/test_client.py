@@ -11,7 +11,7 @@ from bslam.client import Client, ServiceError, localise
 def server(program_run):
     """The address of a running server."""
     process = subprocess.Popen(
-        [PROGRAM, "serve", program_run / "map.bmap", "--port=0", "--token=secret"], stdout=subprocess.PIPE, text=True
+        [PROGRAM, "serve", program_run / "map.bmap", "--port=0", "--token=größer"], stdout=subprocess.PIPE, text=True
     )
     line = process.stdout.readline()
     yield next(word for word in line.split() if word.startswith("http://"))
@@ -22,7 +22,7 @@ def server(program_run):
 
 @pytest.fixture
 def client(server):
-    return Client(server, token="secret")
+    return Client(server, token="größer")
 
 
 def images_of(recording, frame):
@@ -48,7 +48,7 @@ def test_pixels_bytes_and_files_give_the_pose_of_the_run(client, recording, prog
 def test_another_place_has_no_pose(server, recording):
     noise = np.random.default_rng(1).integers(0, 255, recording.images[0][0].shape, dtype=np.uint8)
     first = next(iter(images_of(recording, 0)))
-    found = localise(server, {first: noise}, token="secret")
+    found = localise(server, {first: noise}, token="größer")
     assert not found.localised and found.reason == "not-found" and found.T_world_cam0 is None
 
 

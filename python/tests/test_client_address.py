@@ -1,6 +1,7 @@
 import http.client
 import http.server
 import json
+import re
 import shutil
 import socket
 import ssl
@@ -136,6 +137,45 @@ def test_a_refusal_before_the_end_of_the_request_is_that_of_the_server():
             Client(f"127.0.0.1:{listener.getsockname()[1]}").localise({"cam0": bytes(30_000_000)})
         thread.join()
     assert (caught.value.status, caught.value.retry_after) == (503, 2)
+
+
+@pytest.fixture
+def proxy():
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), Proxy) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        yield f"http://127.0.0.1:{server.server_port}"
+        server.shutdown()
+        thread.join()
+
+
+@pytest.mark.parametrize(
+    ("token", "sent"),
+    [
+        ("secret\n", "Bearer secret"),
+        (" secret words\r\n", "Bearer secret words"),
+        ("größer 鍵", "Bearer größer 鍵"),
+        ("\n", None),
+        ("", None),
+    ],
+)
+def test_a_token_is_sent_as_utf8_without_white_space_around_it(proxy, token, sent):
+    found = Client(proxy, token=token).map()["token"]
+    assert (found and found.encode("latin-1").decode()) == sent  # the proxy reads headers as latin-1
+
+
+@pytest.mark.parametrize("character", ["\n", "\r", "\0", "\x7f", "\udc80"])
+def test_characters_that_no_header_can_contain_are_refused_in_a_token(character):
+    message = re.escape(f"token: found the character {character!r}, expected one line of text, as after --token")
+    with pytest.raises(ValueError, match=f"^{message}$"):
+        Client("robot", token=f"secret{character}words")
+
+
+def test_addresses_that_cannot_be_sent_are_errors_of_the_service():
+    for address in ("http://a..robot", "http://127.0.0.1:1/größer"):
+        with pytest.raises(ServiceError) as caught:
+            Client(address).map()
+        assert caught.value.status == 0
 
 
 @pytest.mark.skipif(shutil.which("openssl") is None, reason="needs openssl for a certificate")

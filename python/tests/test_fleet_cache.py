@@ -1,5 +1,6 @@
 """The cache, and recordings in stores, as workers use them."""
 
+import errno
 import functools
 import io
 import os
@@ -78,6 +79,12 @@ def test_recording_that_can_only_be_listed_is_failed(store, tmp_path):
     store("listed", reading_error=PermissionError(13, "Permission denied"))
     error = made_map(tmp_path, "listed://bucket/monday")["error"]
     assert error == "cannot read listed://bucket/monday: Permission denied"
+
+
+def test_full_disk_under_a_download_is_no_error_of_the_recording(store, tmp_path):
+    store("fetched", reading_error=OSError(errno.ENOSPC, "No space left on device"))
+    with pytest.raises(OSError, match="No space left on device"):
+        made_map(tmp_path, "fetched://bucket/monday")
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]"])

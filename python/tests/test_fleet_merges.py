@@ -14,7 +14,7 @@ import pytest
 
 pytest.importorskip("distributed", reason="distributed is not installed: the fleet is not tested")
 
-from bslam.fleet import _site, _tasks, map_recordings
+from bslam.fleet import _clients, _tasks, map_recordings
 from bslam.fleet._cache import sha256_of
 from bslam.fleet._site import Recording, _Mapping
 from distributed import Client, LocalCluster
@@ -77,7 +77,7 @@ def merge(client, tmp_path, monkeypatch):
             }
             maps[made[name]["map"]] = name
         setup = _tasks.Setup(str(tmp_path / "cache"), _tasks.program_hash())
-        mapping = _Mapping(client, setup, tmp_path / "site", 6, False, set())
+        mapping = _Mapping(client, setup, tmp_path / "site", 6, False, set(), {})
         sites = []
         monkeypatch.setattr(mapping, "_write", sites.extend)
         mapping.run([Recording(name, name) for name in names])
@@ -259,11 +259,11 @@ def test_scheduler_without_workers_is_named_also_later(monkeypatch):
             looked.release()
         return found
 
-    monkeypatch.setattr(_site, "_LOOK_S", 0.01)
+    monkeypatch.setattr(_clients, "_LOOK_S", 0.01)
     monkeypatch.setattr(Client, "nthreads", look)
     monkeypatch.setattr(sys, "stderr", heard := Heard())
     cluster = LocalCluster(processes=False, n_workers=0, dashboard_address=None)
-    with cluster, _site._connected(None, cluster.scheduler_address, None, True):
+    with cluster, _clients.connected(None, cluster.scheduler_address, None, True):
         assert heard.messages.acquire(timeout=60)
         cluster.scale(1)
         assert looked.acquire(timeout=60)

@@ -63,12 +63,11 @@ def test_no_maps_have_no_likely_pairs():
     assert likely_pairs([], 6) == []
 
 
-def test_reason_is_shown_if_no_recording_gives_a_map(recording, cluster, tmp_path):
-    status, out, _ = fleet(
-        recording.folder, "--out", tmp_path / "site", "--scheduler", cluster.scheduler_address, "--set", "foo=1"
-    )
+def test_reason_is_shown_if_no_recording_gives_a_map(cluster, tmp_path):
+    (tmp_path / "data").mkdir()
+    status, out, _ = fleet(tmp_path / "data", "--out", tmp_path / "site", "--scheduler", cluster.scheduler_address)
     assert status == 3
-    assert out.startswith("failed: data: --set: unknown setting 'foo'")
+    assert out.startswith(f"failed: data: cannot open {tmp_path}/data: the folder has no files\n")
     (found,) = json.loads((tmp_path / "site/site.json").read_text())["recordings"]
     assert found["state"] == "failed"
 
@@ -162,8 +161,9 @@ def test_names_that_are_equal_are_those_of_the_folders_above(tmp_path):
 @pytest.mark.parametrize(
     "name", ["../mine.bmap", "/etc/mine.bmap", "apart/../mine.bmap", "apart/a/b.bmap", "notes.txt"]
 )
-def test_files_that_are_no_results_are_not_deleted(recording, cluster, tmp_path, name):
-    out, mine = tmp_path / "out", tmp_path / "mine.bmap"
+def test_files_that_are_no_results_are_not_deleted(cluster, tmp_path, name):
+    out, mine, empty = tmp_path / "out", tmp_path / "mine.bmap", tmp_path / "empty"
+    empty.mkdir()
     (out / "apart").mkdir(parents=True)
     mine.write_text("precious")
     (out / "notes.txt").write_text("precious")
@@ -171,8 +171,8 @@ def test_files_that_are_no_results_are_not_deleted(recording, cluster, tmp_path,
     (out / "site.json").write_text(text)
     with Client(cluster) as client:
         with pytest.raises(bslam.Error, match="found another file, expected the site.json of an earlier run"):
-            map_recordings([recording.folder], out, client=client)
-        map_recordings([recording.folder], out, client=client, overwrite=True, settings=["foo=1"])
+            map_recordings([empty], out, client=client)
+        map_recordings([empty], out, client=client, overwrite=True)
     assert mine.read_text() == "precious"
     assert (out / "notes.txt").read_text() == "precious"
 
@@ -188,14 +188,15 @@ def test_sketch_that_is_missing_in_the_cache_is_named(recording, cluster, tmp_pa
 
 
 @pytest.mark.parametrize("text", ["{", "[]", '{"schema": 1}', '{"recordings": [{"name": "a"}]}', '{"recordings": [1]}'])
-def test_other_site_json_is_not_replaced(recording, cluster, tmp_path, text):
+def test_other_site_json_is_not_replaced(cluster, tmp_path, text):
+    (empty := tmp_path / "cache/empty").mkdir(parents=True)
     (tmp_path / "site.json").write_text(text)
     message = "site.json: found another file, expected the site.json of an earlier run, or --overwrite"
     with Client(cluster) as client:
         with pytest.raises(bslam.Error, match=message):
-            map_recordings([recording.folder], tmp_path, client=client)
+            map_recordings([empty], tmp_path, client=client)
         assert (tmp_path / "site.json").read_text() == text
-        map_recordings([recording.folder], tmp_path, client=client, overwrite=True, settings=["foo=1"])
+        map_recordings([empty], tmp_path, client=client, overwrite=True)
     assert json.loads((tmp_path / "site.json").read_text())["schema"] == 1
 
 

@@ -17,6 +17,17 @@ from fsspec.implementations.local import LocalFileSystem
 Result = dict[str, Any]
 
 
+class UnreadableError(Exception):
+    """A recording cannot be read. The text says which one, and why."""
+
+
+def reason_of(error: Exception) -> str:
+    """The reason of the system, and the file that it concerns; or the text of the error."""
+    if not isinstance(error, OSError) or error.strerror is None:
+        return str(error) or type(error).__name__
+    return error.strerror if error.filename is None else f"{error.filename}: {error.strerror}"
+
+
 def sha256_of(file: str | os.PathLike[str]) -> str:
     """Hash of the content of a file."""
     with open(file, "rb") as stream:
@@ -86,25 +97,37 @@ def _flush(folder: pathlib.Path) -> None:
 
 
 def content_of(cache: str, recording: str) -> str:
-    """Hash of the content of a recording.
+    """Hash of the content of a recording. Raises UnreadableError, unless it is the cache that cannot be used.
 
     Files on disk are only read again if a size or modification time has changed. In object stores, the listing
     identifies the content; on web servers the header of the answer, or else the content itself.
     """
-    system, root = fsspec.url_to_fs(recording)
-    local = isinstance(system, LocalFileSystem)
-    files = sorted(_files_below(root) if local else system.find(root))
-    if not files:
-        raise FileNotFoundError("No such file or directory")
-    listing = [(os.path.relpath(f, root), *(_stat(f) if local else [_version(system, f)])) for f in files]
+    with _reading(recording):
+        system, root = fsspec.url_to_fs(recording)
+        local = isinstance(system, LocalFileSystem)
+        files = sorted(_files_below(root) if local else system.find(root))
+        if not files:
+            raise FileNotFoundError("the folder has no files" if local else "No such file or directory")
+        listing = [(os.path.relpath(f, root), *(_stat(f) if local else [_version(system, f)])) for f in files]
     if not local:
         return key_of(listing)
-    return cached(
-        cache,
-        "contents",
-        [root, listing],
-        lambda _: {"content": key_of([(os.path.relpath(f, root), sha256_of(f)) for f in files])},
-    )["content"]
+
+    def make(_: pathlib.Path) -> Result:
+        with _reading(recording):
+            return {"content": key_of([(os.path.relpath(f, root), sha256_of(f)) for f in files])}
+
+    return cached(cache, "contents", [root, listing], make)["content"]
+
+
+@contextlib.contextmanager
+def _reading(recording: str) -> Iterator[None]:
+    """Errors are those of a recording."""
+    try:
+        yield
+    except Exception as error:  # each store has errors of its own
+        if "://" not in recording and not isinstance(error, (OSError, ValueError, ImportError)):
+            raise
+        raise UnreadableError(f"cannot open {recording}: {reason_of(error)}") from error
 
 
 def local_copy(recording: str, folder: pathlib.Path) -> str:

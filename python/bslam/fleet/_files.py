@@ -8,12 +8,13 @@ import pathlib
 import re
 import shutil
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Union
 
 from .. import _bslam
+from . import _interruption
 from ._cache import sha256_of
-from ._tasks import run_program
+from ._tasks import refusal, run_program
 
 Path = Union[str, "os.PathLike[str]"]
 
@@ -21,14 +22,43 @@ _RESULT = re.compile(r"site(_\d+)?\.bmap|apart/[^/]+\.(bmap|tum)|trajectories/[^
 _MASK = re.compile(r'^    mask: "(.*)"$', re.MULTILINE)  # in a rig file that the program has written
 
 
+def check_settings(config: Path | None, settings: Sequence[str]) -> None:
+    """Refuses settings as each run would do it, with the names of the user."""
+    if config is not None or settings:
+        files = () if config is None else (f"--config={os.fspath(config)}",)
+        run_program("settings", *files, *(f"--set={s}" for s in settings))
+
+
+def check_rig(rig: Path, recordings: Sequence[str]) -> None:
+    """Refuses a calibration that fits none of the recordings. Those that are not on disk are not looked at."""
+    reason = ""
+    for recording in recordings:
+        _interruption.raise_if_noted()
+        if "://" in recording or not (refused := refusal(recording, f"--rig={os.fspath(rig)}")):
+            return
+        if not reason and not refusal(recording):  # otherwise the reason is the recording
+            reason = refused.partition("; --cameras ")[0]  # an option of other commands
+    if reason:
+        raise _bslam.Error(f"--rig: it fits none of the recordings: {reason}")
+
+
 def options(
     cache: pathlib.Path, rig: Path | None, config: Path | None, settings: Sequence[str]
-) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """The options of `run` and of all commands. Files are copied into the cache, under the hashes of their contents."""
-    return (
-        () if rig is None else (f"--rig={shared_rig(cache, rig)}",),
-        (*(() if config is None else (f"--config={_shared(cache, config)}",)), *(f"--set={s}" for s in settings)),
-    )
+) -> tuple[tuple[str, ...], tuple[str, ...], dict[str, str]]:
+    """The options of `run` and of all commands, and the files of the user by those that the options name instead.
+
+    Files are copied into the cache, under the hashes of their contents.
+    """
+    run: list[str] = []
+    common = [f"--set={s}" for s in settings]
+    given: dict[str, str] = {}
+    if rig is not None:
+        run.append(f"--rig={(copied := shared_rig(cache, rig))}")
+        given[str(copied)] = os.fspath(rig)
+    if config is not None:
+        common.insert(0, f"--config={(copied := _shared(cache, config))}")
+        given[str(copied)] = os.fspath(config)
+    return tuple(run), tuple(common), given
 
 
 def shared_rig(cache: pathlib.Path, rig: Path) -> pathlib.Path:
@@ -64,6 +94,7 @@ def _shared(cache: pathlib.Path, file: Path) -> pathlib.Path:
 def open_results(out: pathlib.Path, overwrite: bool) -> set[str]:
     """Creates the folder of the results and returns the files of an earlier result in it, relative to the folder."""
     make_folder(out, "--out")
+    _check_writable(out)
     there = set(os.listdir(out))
     if "site.json" not in there and there - {"cache"} and not overwrite:
         raise _bslam.Error(
@@ -107,6 +138,41 @@ def make_folder(folder: pathlib.Path, option: str) -> None:
         ) from error
 
 
+def _check_writable(out: pathlib.Path) -> None:
+    """Refuses a folder before hours of work for it."""
+    try:
+        tempfile.TemporaryFile(dir=out).close()
+    except OSError as error:
+        raise _bslam.Error(f"{out}: --out: found {error.strerror}, expected a folder that can be written") from error
+
+
+def replace_results(
+    out: pathlib.Path, files: Mapping[str, pathlib.Path], summary: dict[str, Any], earlier: set[str]
+) -> None:
+    """Writes copies of `files`, by their names in the folder, and the summary, in place of the `earlier` files.
+
+    No file is replaced before all are complete, so that the earlier result remains if the disk is full.
+    """
+    if not (out / "site.json").exists():
+        _write_json(out / "site.json", {"schema": 1, "sites": [], "recordings": [], "warnings": []})  # to know it again
+    try:
+        with tempfile.TemporaryDirectory(prefix=".", dir=out, ignore_cleanup_errors=True) as work:
+            for name, source in files.items():
+                copy(source, pathlib.Path(work, name))
+            _write_json(pathlib.Path(work, "site.json"), summary)
+            for name in (*files, "site.json"):
+                (out / name).parent.mkdir(exist_ok=True)
+                pathlib.Path(work, name).replace(out / name)
+    except OSError as error:
+        raise _bslam.Error(f"cannot write {out}: {error.strerror}; the same command continues") from error
+    for name in earlier - set(files):
+        (out / name).unlink(missing_ok=True)
+
+
+def _write_json(file: pathlib.Path, value: dict[str, Any]) -> None:
+    write(file, lambda unfinished: unfinished.write_text(json.dumps(value, indent=1) + "\n"))
+
+
 def copy(source: Path, file: pathlib.Path) -> None:
     """Copies a file, which appears under its name when it is complete."""
     write(file, lambda unfinished: shutil.copyfile(source, unfinished))
@@ -121,4 +187,4 @@ def write(file: pathlib.Path, make: Callable[[pathlib.Path], Any]) -> None:
             make(unfinished)
             unfinished.replace(file)
     except OSError as error:
-        raise _bslam.Error(f"cannot write {file}: {error.strerror}") from error
+        raise _bslam.Error(f"cannot write {file}: {error.strerror}; the same command continues") from error

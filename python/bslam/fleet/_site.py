@@ -2,36 +2,31 @@
 
 from __future__ import annotations
 
-import contextlib
 import io
 import json
-import logging
 import os
 import pathlib
 import re
 import sys
-import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import click
-import dask
-import numpy as np
-from distributed import CancelledError, Client, Future, KilledWorker, LocalCluster, as_completed
+from distributed import CancelledError, Client, Future, KilledWorker, as_completed
 
 from .. import _bslam
-from . import _files, _interruption, _tasks
-from ._cache import Result
+from . import _clients, _files, _interruption, _tasks
+from ._cache import Result, reason_of
 from ._files import Path
-from ._sketch import likely_pairs
+from ._sketch import likely_pairs, sketch_in
 
 _FAN_IN = 5  # maps that are merged at once
 _NUMBERS = ("keyframes", "landmarks")  # sizes of a map
-_LOOK_S = 10.0  # time between looks for workers
 _POLL_S = 0.1  # time between looks for tasks that have ended, and for Ctrl-C
 _HASH = re.compile("[0-9a-f]{64}")
+_NOT_WRITTEN = (OSError, _tasks.NotWrittenError)  # errors of files of the cache
 
 
 @dataclass
@@ -123,19 +118,24 @@ def map_recordings(
 
     Raises:
         Error: a folder that is not empty or cannot be written, a file that does not exist, a calibration that cannot
-            be read, a recording that is given twice, a scheduler that cannot be reached.
+            be read or fits none of the recordings, a wrong setting, a recording that is given twice, a scheduler that
+            cannot be reached. An earlier result in `out` is then as it was.
     """
     for option, number in (("--workers", workers), ("--partners", partners)):
         if number is not None and number < 1:
             raise _bslam.Error(f"{option}: found {number}, expected a number of at least 1")
     named = _named(recordings)
+    _files.check_settings(config, settings)
     out = pathlib.Path(out).absolute()
     earlier = _files.open_results(out, overwrite)
     folder = pathlib.Path(cache or out / "cache").absolute()
     _files.make_folder(folder, "--cache")
-    setup = _tasks.Setup(str(folder), _tasks.program_hash(), *_files.options(folder, rig, config, settings))
-    with _interruption.noted(), _connected(client, scheduler, workers, progress) as dask_client:
-        return _Mapping(dask_client, setup, out, partners, progress, earlier).run(named)
+    run, common, copies = _files.options(folder, rig, config, settings)
+    if rig is not None:
+        _files.check_rig(rig, [r.data for r in named])
+    setup = _tasks.Setup(str(folder), _tasks.program_hash(), run, common)
+    with _interruption.noted(), _clients.connected(client, scheduler, workers, progress) as dask_client:
+        return _Mapping(dask_client, setup, out, partners, progress, earlier, copies).run(named)
 
 
 def _named(recordings: Sequence[Path]) -> list[Recording]:
@@ -161,79 +161,24 @@ def _named(recordings: Sequence[Path]) -> list[Recording]:
             depth[i] += 1
 
 
-@contextlib.contextmanager
-def _connected(client: Client | None, scheduler: str | None, workers: int | None, progress: bool) -> Iterator[Client]:
-    with contextlib.ExitStack() as stack:
-        if client is None:
-            client = _local_client(stack, workers) if scheduler is None else _client_of(stack, scheduler)
-        if progress:
-            print(f"dashboard: {client.dashboard_link or 'none'}", file=sys.stderr)
-            if scheduler is not None:
-                stack.enter_context(_watched(client, scheduler))
-        yield client
-
-
-@contextlib.contextmanager
-def _watched(client: Client, scheduler: str) -> Iterator[None]:
-    """Says it on stderr if there are no workers, also later: workers end if they cannot read a task."""
-    ended = threading.Event()
-
-    def watch() -> None:
-        workers = True
-        while not ended.is_set():
-            with contextlib.suppress(Exception):  # a lost scheduler is an error of the tasks
-                before, workers = workers, bool(client.nthreads())
-                if before and not workers:
-                    print(f"no worker is connected to {scheduler}: start some by dask worker", file=sys.stderr)
-            ended.wait(_LOOK_S)
-
-    with _interruption.not_in_children():
-        thread = threading.Thread(target=watch, daemon=True)
-        thread.start()
-    try:
-        yield
-    finally:
-        ended.set()
-        thread.join()
-
-
-def _local_client(stack: contextlib.ExitStack, workers: int | None) -> Client:
-    # If a worker is killed, its task is probably not the cause; another worker tries it again.
-    stack.enter_context(dask.config.set({"distributed.scheduler.allowed-failures": 100}))
-    count = workers or os.cpu_count() or 1
-    with _interruption.not_in_children():
-        cluster = LocalCluster(
-            n_workers=count,
-            threads_per_worker=1,
-            memory_limit=0,
-            dashboard_address=":0",
-            silence_logs=logging.CRITICAL,  # failures of tasks are reported; the rest is about those that end early
-        )
-        stack.enter_context(cluster)
-        cluster.adapt(minimum=count, maximum=count)  # replaces workers that do not come back
-        return stack.enter_context(Client(cluster))
-
-
-def _client_of(stack: contextlib.ExitStack, scheduler: str) -> Client:
-    try:
-        return stack.enter_context(Client(scheduler))
-    except ValueError as error:
-        raise _bslam.Error(
-            f"--scheduler: found {scheduler}, expected an address such as tcp://HOST:8786 ({error})"
-        ) from error
-    except OSError as error:
-        raise _bslam.Error(f"the scheduler {scheduler} cannot be reached: {error}") from error
-
-
 class _Mapping:
     """One call of map_recordings."""
 
     def __init__(
-        self, client: Client, setup: _tasks.Setup, out: pathlib.Path, partners: int, progress: bool, earlier: set[str]
+        self,
+        client: Client,
+        setup: _tasks.Setup,
+        out: pathlib.Path,
+        partners: int,
+        progress: bool,
+        earlier: set[str],
+        copies: Mapping[str, str],
     ) -> None:
         self.client, self.setup, self.partners, self.progress = client, setup, partners, progress
         self.earlier = earlier  # files of the result that this one replaces
+        self.copies = copies  # by file in the cache: the file of the user
         self.site = Site(out)
+        self.files: dict[str, pathlib.Path] = {}  # by name of a file of the result: the file in the cache
         self.verdicts: dict[tuple[str, str], bool] = {}  # whether the maps of a pair share a place
         self.reasons: dict[str, str] = {}  # by hash of a map: why it shares no place with another map
         self.refused: list[frozenset[str]] = []  # hashes of maps that cannot be in one map
@@ -242,19 +187,36 @@ class _Mapping:
     def run(self, recordings: list[Recording]) -> Site:
         self.site.recordings = recordings
         made = self._done("maps", [self._submit(_tasks.make_map, r.data) for r in recordings])
-        groups: dict[str, list[tuple[Recording, Result]]] = {}  # recordings with the same map, by its hash
+        found: dict[str, tuple[Recording, Result]] = {}  # by hash of the map
+        again: list[tuple[Result, list[tuple[Recording, Result]]]] = []  # recordings with a map that is found already
         for recording, result in zip(recordings, made, strict=True):
-            self.site.warnings += [f"{recording.name}: {warning}" for warning in result.get("warnings", [])]
+            warnings = map(self._as_given, result.get("warnings", []))
+            self.site.warnings += [f"{recording.name}: {warning}" for warning in warnings]
             if "error" in result:
-                recording.state, recording.reason = "failed", result["error"]
+                recording.state, recording.reason = "failed", self._as_given(result["error"])
+            elif result["map"] in found:
+                self._note_copy(recording, found[result["map"]][0])
+                again.append((result, [(recording, result)]))
             else:
-                groups.setdefault(result["map"], []).append((recording, result))
-        maps = {key: group[0][1] for key, group in sorted(groups.items())}
-        self.names = {key: group[0][0].name for key, group in groups.items()}
-        self._write(
-            [(merged, [pair for key in members for pair in groups[key]]) for merged, members in self._merged(maps)]
-        )
+                found[result["map"]] = (recording, result)
+        if not found and self.earlier:
+            self.site.warnings.append(f"every recording failed; the earlier result in {self.site.folder} is kept")
+            return self.site
+        self.names = {key: recording.name for key, (recording, _) in found.items()}
+        merged = self._merged({key: result for key, (_, result) in sorted(found.items())})
+        self._write([*((result, [found[key] for key in members]) for result, members in merged), *again])
         return self.site
+
+    def _as_given(self, text: str) -> str:
+        """The text with the names of the user's files instead of those of their copies."""
+        for copy, given in self.copies.items():
+            text = text.replace(copy, given)
+        return text
+
+    def _note_copy(self, recording: Recording, first: Recording) -> None:
+        """A recording with the content of another one says nothing about common places."""
+        recording.reason = f"it has the content of {first.name}"
+        self.site.warnings.append(f"{recording.name}: {recording.reason}; only {first.name} is compared with others")
 
     def _submit(self, task: Any, *arguments: Any) -> Future:
         # Not pure: Dask would give the error of an earlier call, whose cause may have been mended, once more.
@@ -266,18 +228,20 @@ class _Mapping:
             waiting = as_completed(futures)
             while not waiting.is_empty():
                 _interruption.raise_if_noted()
-                if waiting.has_ready():
-                    bar.update(len(waiting.next_batch(block=False)))
-                else:
+                if not waiting.has_ready():
                     time.sleep(_POLL_S)
+                    continue
+                bar.update(len(ended := waiting.next_batch(block=False)))
+                if any(f.status == "error" and isinstance(f.exception(), _NOT_WRITTEN) for f in ended):
+                    break  # the other tasks would end in the same way
         try:
             results = self.client.gather(futures)
         except (CancelledError, KilledWorker) as error:
             raise _bslam.Error(
                 f"the scheduler or its workers were lost; the same command continues ({type(error).__name__})"
             ) from error
-        except (OSError, _tasks.ProgramKilledError) as error:
-            raise _bslam.Error(f"{label}: {_tasks.reason_of(error)}; the same command continues") from error
+        except (*_NOT_WRITTEN, _tasks.ProgramKilledError) as error:
+            raise _bslam.Error(f"{label}: {reason_of(error)}; the same command continues") from error
         except (ImportError, RuntimeError) as error:
             if isinstance(error, RuntimeError) and "deserializ" not in str(error):
                 raise
@@ -347,7 +311,7 @@ class _Mapping:
     def _likely_pairs(self, maps: dict[str, Result]) -> list[tuple[str, str]]:
         metric = [key for key, m in maps.items() if m["scale"] == "metric"]
         self.reasons = {key: "the scale of its map is not metric" for key in maps if key not in metric}
-        sketches = [_sketch_in(pathlib.Path(maps[key]["folder"])) for key in metric]
+        sketches = [sketch_in(pathlib.Path(maps[key]["folder"])) for key in metric]
         return [(metric[i], metric[j]) for i, j in likely_pairs(sketches, self.partners)]
 
     def _compare(self, pairs: list[tuple[str, str]], maps: dict[str, Result]) -> None:
@@ -361,37 +325,35 @@ class _Mapping:
                     self.reasons.setdefault(key, verdict["reason"])
 
     def _write(self, sites: list[tuple[Result, list[tuple[Recording, Result]]]]) -> None:
-        if not (self.site.folder / "site.json").exists():
-            self._write_json({"schema": 1, "sites": [], "recordings": [], "warnings": []})  # by which it is known again
         shared = [(merged, r, own) for merged, members in sites if len(members) > 1 for r, own in members]
         moved = self._done("trajectories", [self._submit(_tasks.transfer, own, merged) for merged, _, own in shared])
         trajectories = {r.name: m for (_, r, _), m in zip(shared, moved, strict=True)}
         for merged, members in sites:
             joined = [r.name for r, _ in members if trajectories.get(r.name, {}).get("joined")]
             if len(joined) > 1:
-                self._write_site(merged, joined)
+                self._add_site(merged, joined)
             for r, own in members:
                 if r.name in joined and len(joined) > 1:
                     r.state, r.map, source = "joined", self.site.sites[-1]["map"], trajectories[r.name]
                 else:
-                    r.reason = self._reason(own["map"], len(members) > 1)
+                    r.reason = r.reason or self._reason(own["map"], len(members) > 1)
                     r.map, source = f"apart/{r.name}.bmap", own
-                    _files.copy(pathlib.Path(own["folder"], "map.bmap"), self.site.folder / r.map)
-                self._write_trajectories(r, source)
-        self._write_summary()
+                    self.files[r.map] = pathlib.Path(own["folder"], "map.bmap")
+                self._add_trajectories(r, source)
+        _files.replace_results(self.site.folder, self.files, self._summary(), self.earlier)
 
-    def _write_trajectories(self, recording: Recording, source: Result) -> None:
+    def _add_trajectories(self, recording: Recording, source: Result) -> None:
         recording.trajectory = f"trajectories/{recording.name}.tum"
         files = {"trajectory.tum": recording.trajectory}
         files.update({part: f"apart/{recording.name}{part.removeprefix('trajectory')}" for part in source["parts"]})
         recording.parts = [files[part] for part in source["parts"]]
         for name, file in files.items():
-            _files.copy(pathlib.Path(source["folder"], name), self.site.folder / file)
+            self.files[file] = pathlib.Path(source["folder"], name)
 
-    def _write_site(self, merged: Result, names: list[str]) -> None:
+    def _add_site(self, merged: Result, names: list[str]) -> None:
         number = len(self.site.sites) + 1
         file = "site.bmap" if number == 1 else f"site_{number}.bmap"
-        _files.copy(pathlib.Path(merged["folder"], "map.bmap"), self.site.folder / file)
+        self.files[file] = pathlib.Path(merged["folder"], "map.bmap")
         self.site.sites.append({"map": file, "recordings": sorted(names), **{n: merged[n] for n in _NUMBERS}})
 
     def _reason(self, key: str, verified: bool) -> str:
@@ -399,30 +361,13 @@ class _Mapping:
             return "it has a place in common with another recording, but the merged map does not confirm it"
         return self.reasons.get(key, "no place looks like one of another recording")
 
-    def _write_summary(self) -> None:
-        now = {
+    def _summary(self) -> dict[str, Any]:
+        return {
             "schema": 1,
             "sites": self.site.sites,
             "recordings": [vars(r) for r in self.site.recordings],
             "warnings": self.site.warnings,
         }
-        self._write_json(now)
-        for name in self.earlier - _files.files_of(now):
-            (self.site.folder / name).unlink(missing_ok=True)
-
-    def _write_json(self, summary: dict[str, Any]) -> None:
-        text = json.dumps(summary, indent=1) + "\n"
-        _files.write(self.site.folder / "site.json", lambda file: file.write_text(text))
-
-
-def _sketch_in(folder: pathlib.Path) -> np.ndarray[Any, Any]:
-    try:
-        return np.load(folder / "sketch.npy")
-    except (OSError, ValueError, EOFError) as error:
-        raise _bslam.Error(
-            f"cannot read {folder / 'sketch.npy'}: {getattr(error, 'strerror', None) or error}; delete its folder, "
-            "which the same command makes again"
-        ) from error
 
 
 def _may_join(a: tuple[str, ...], b: tuple[str, ...], refused: list[frozenset[str]]) -> bool:

@@ -7,12 +7,15 @@ their buckets (locality-sensitive hashing), so that only maps with a bucket in c
 
 from __future__ import annotations
 
+import pathlib
 from collections import Counter
 from collections.abc import Sequence
 from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+
+from .. import _bslam
 
 HASHES, ROWS = 64, 2  # a band has ROWS minima
 
@@ -31,6 +34,17 @@ def _hashes(words: NDArray[np.int32]) -> NDArray[np.uint32]:
     for shift, factor in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB)):  # splitmix64
         x = (x ^ (x >> np.uint64(shift))) * np.uint64(factor)
     return (x >> np.uint64(32)).astype(np.uint32)
+
+
+def sketch_in(folder: pathlib.Path) -> Sketch:
+    """The sketch in the folder of a map in the cache."""
+    try:
+        return np.load(folder / "sketch.npy")
+    except (OSError, ValueError, EOFError) as error:
+        raise _bslam.Error(
+            f"cannot read {folder / 'sketch.npy'}: {getattr(error, 'strerror', None) or error}; delete its folder, "
+            "which the same command makes again"
+        ) from error
 
 
 def likely_pairs(sketches: Sequence[Sketch], partners: int) -> list[tuple[int, int]]:

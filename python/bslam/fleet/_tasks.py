@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import errno
 import functools
 import json
 import os
@@ -18,10 +19,11 @@ import numpy as np
 
 from .. import _bslam
 from .._program import PROGRAM
-from ._cache import Result, cached, content_of, key_of, local_copy, sha256_of
+from ._cache import Result, UnreadableError, cached, content_of, key_of, local_copy, reason_of, sha256_of
 from ._sketch import sketch
 
 _NOTHING_TRACKED, _WRONG_INPUT = 3, 2  # exit status
+_CANNOT_WRITE = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)  # errors that reading never has
 
 
 class ProgramKilledError(RuntimeError):
@@ -32,11 +34,8 @@ class RefusedError(_bslam.Error):
     """The program has refused its input, as it does each time."""
 
 
-def reason_of(error: Exception) -> str:
-    """The reason of the system, and the file that it concerns; or the text of the error."""
-    if not isinstance(error, OSError) or error.strerror is None:
-        return str(error) or type(error).__name__
-    return error.strerror if error.filename is None else f"{error.filename}: {error.strerror}"
+class NotWrittenError(_bslam.Error):
+    """The program could not write a file, for example because the disk is full: no fault of its input."""
 
 
 @dataclass(frozen=True)
@@ -71,10 +70,8 @@ def make_map(setup: Setup, recording: str) -> Result:
     setup.check()
     try:
         content = content_of(setup.cache, recording)
-    except Exception as error:  # each store has errors of its own
-        if "://" not in recording and not isinstance(error, (OSError, ValueError, ImportError)):
-            raise
-        return {"error": f"cannot open {recording}: {reason_of(error)}", "computed": False}
+    except UnreadableError as error:
+        return {"error": str(error), "computed": False}
 
     def make(folder: pathlib.Path) -> Result:
         with tempfile.TemporaryDirectory() as work:
@@ -96,7 +93,7 @@ def make_map(setup: Setup, recording: str) -> Result:
             if done.returncode == _NOTHING_TRACKED:
                 return {"error": "no frame could be tracked", "warnings": [*map(neutral, _warnings(done))]}
             if done.returncode != 0:
-                raise _bslam.Error(_message(done))
+                raise _error_of(done)
             parts = sorted((f.name for f in run.glob("trajectory_part*.tum")), key=lambda name: (len(name), name))
             for name in ("trajectory.tum", *parts, "summary.json"):
                 shutil.copy(run / name, folder)
@@ -113,6 +110,8 @@ def make_map(setup: Setup, recording: str) -> Result:
 
     try:
         result = cached(setup.cache, "maps", [setup.program, setup.run, setup.settings, content], make)
+    except NotWrittenError:
+        raise
     except _bslam.Error as error:
         return {"error": str(error), "computed": True}
     return {**result, "warnings": [w.replace(content, recording) for w in result["warnings"]]}
@@ -123,6 +122,8 @@ def _fetched(recording: str, folder: pathlib.Path) -> str:
     try:
         return local_copy(recording, folder)
     except Exception as error:
+        if isinstance(error, OSError) and error.errno in _CANNOT_WRITE:
+            raise
         raise _bslam.Error(f"cannot read {recording}: {reason_of(error)}") from error
 
 
@@ -235,13 +236,28 @@ def run_program(*arguments: str) -> str:
     return _checked(*arguments).stdout
 
 
+def refusal(recording: str, *options: str) -> str:
+    """Why `bslam run` with these options would refuse a recording; empty if it would not."""
+    done = _run("data", "info", recording, "--json", *options)
+    try:
+        return json.loads(done.stdout)["refused"] or ""
+    except (ValueError, KeyError):  # it is no recording
+        return _message(done)
+
+
 def _checked(*arguments: str) -> subprocess.CompletedProcess[str]:
     done = _run(*arguments)
-    if done.returncode == 0:
-        return done
+    if done.returncode != 0:
+        raise _error_of(done)
+    return done
+
+
+def _error_of(done: subprocess.CompletedProcess[str]) -> _bslam.Error:
     message = _message(done)
-    refused = done.returncode == _WRONG_INPUT and ", expected " in message  # unlike a file that cannot be written
-    raise (RefusedError if refused else _bslam.Error)(message)
+    if message.startswith("cannot write ") or message.endswith(", expected a folder that can be created"):
+        return NotWrittenError(message)
+    refused = done.returncode == _WRONG_INPUT and ", expected " in message
+    return (RefusedError if refused else _bslam.Error)(message)
 
 
 def _run(*arguments: str) -> subprocess.CompletedProcess[str]:
