@@ -2,6 +2,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
+#include <set>
 #include <string_view>
 #include <utility>
 
@@ -28,7 +30,17 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
 }
 
-// One line "timestamp [ns],filename" per image. Empty lines and lines that begin with # are ignored.
+// Returns true for a line such as "timestamp,filename".
+bool is_header(std::string_view line) { return line.starts_with("time") || line.starts_with("stamp"); }
+
+// The file in the folder of images. Some lists have the path from the folder of the list.
+fs::path listed_file(const fs::path& image_folder, std::string_view name) {
+  const fs::path path = name;
+  return path.has_parent_path() && path.parent_path() == image_folder.filename() ? image_folder / path.filename()
+                                                                                 : image_folder / path;
+}
+
+// One line "timestamp [ns],filename" per image. Empty lines, lines that begin with #, and a header are ignored.
 Result<std::vector<image_files::ImageFile>> parse_list(const fs::path& file, std::string_view text,
                                                        const fs::path& image_folder) {
   std::vector<image_files::ImageFile> images;
@@ -38,7 +50,7 @@ Result<std::vector<image_files::ImageFile>> parse_list(const fs::path& file, std
     const std::string_view line = trimmed(text.substr(0, end));
     text.remove_prefix(std::min(end + 1, text.size()));
     ++number;
-    if (line.empty() || line.front() == '#') continue;
+    if (line.empty() || line.front() == '#' || (number == 1 && is_header(line))) continue;
     const auto error = [&](std::string_view found, std::string expected) {
       return Error{file.string(), fmt::format("line {}", number), std::string(found.substr(0, 60)),
                    std::move(expected)};
@@ -49,9 +61,29 @@ Result<std::vector<image_files::ImageFile>> parse_list(const fs::path& file, std
     const std::string_view rest = comma == std::string_view::npos ? "" : line.substr(comma + 1);
     const std::string_view name = trimmed(rest.substr(0, rest.find(',')));
     if (name.empty()) return error(line, "timestamp,filename");
-    images.push_back({image_folder / name, *time});
+    images.push_back({listed_file(image_folder, name), *time});
   }
   return images;
+}
+
+// Images that were converted to another format after the list was written have the same names but for their extensions.
+void find_converted(const std::vector<fs::path>& present, std::vector<image_files::ImageFile>& images) {
+  const std::set<fs::path> files(present.begin(), present.end());
+  std::map<fs::path, fs::path> by_stem;
+  for (const fs::path& file : present) by_stem.try_emplace(file.parent_path() / file.stem(), file);
+  for (image_files::ImageFile& image : images) {
+    if (files.contains(image.path)) continue;
+    const auto converted = by_stem.find(image.path.parent_path() / image.path.stem());
+    if (converted != by_stem.end()) image.path = converted->second;
+  }
+}
+
+// The images of a folder without a list, whose names are their time stamps.
+Result<image_files::ImageList> named_images(const fs::path& folder, const std::vector<fs::path>& present) {
+  auto named = images_by_name(folder, present);
+  if (!named) return named.error();
+  const auto unit = named->in_seconds ? image_files::StampUnit::kSeconds : image_files::StampUnit::kOfFile;
+  return image_files::in_time_order(std::move(named->images), folder.string(), unit);
 }
 
 class EurocRecording : public Recording {
@@ -70,14 +102,17 @@ class EurocRecording : public Recording {
   }
 
   Result<image_files::ImageList> images(std::size_t camera) const override {
-    const fs::path file = folders_[camera] / "data.csv";
+    const fs::path folder = folders_[camera] / "data", file = folders_[camera] / "data.csv";
+    const std::vector<fs::path> present = image_files_of(folder);
+    std::error_code error;
+    if (!present.empty() && !fs::exists(file, error)) return named_images(folder, present);
     const auto text = read_text(file, kMaxListBytes);
     if (!text) return text.error();
-    auto images = parse_list(file, *text, folders_[camera] / "data");
+    auto images = parse_list(file, *text, folder);
     if (!images) return images.error();
     if (images->empty()) return Error{file.string(), "", "no images", "one line timestamp,filename per image"};
-    const fs::path folder = folders_[camera] / "data";
-    return listed_images(*std::move(images), file, folder, image_files_of(folder), image_files::StampUnit::kOfFile);
+    find_converted(present, *images);
+    return listed_images(*std::move(images), file, folder, present, image_files::StampUnit::kOfFile);
   }
 
   // bslam simulate numbers the folders in the order of the rig, whose cameras may have other names.

@@ -310,9 +310,36 @@ TEST_F(SmallEuroc, EmptyList) {
   }
 }
 
-TEST_F(SmallEuroc, ListIsMissing) {
+TEST_F(SmallEuroc, ListAndImagesAreMissing) {
   fs::remove(camera(0) / "data.csv");
+  fs::remove_all(camera(0) / "data");
   expect_error(camera(0) / "data.csv", "No such file");
+}
+
+TEST_F(SmallEuroc, ImagesWithoutAListHaveTheTimesOfTheirNames) {
+  fs::remove(camera(0) / "data.csv");
+  const auto dataset = open();
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  ASSERT_EQ(dataset->frames.size(), static_cast<std::size_t>(support::kSmallFrames));
+  EXPECT_EQ(dataset->frames[7].images[0]->path, image(7));
+  EXPECT_EQ(dataset->frames[7].images[0]->time_ns, dataset->frames[7].images[1]->time_ns);
+  EXPECT_TRUE(dataset->warnings.empty());
+}
+
+// A header without #, paths from the folder of the list, and images that were converted after the list was written.
+TEST_F(SmallEuroc, ListsOfOtherProgramsNameTheSameImages) {
+  std::string list = "timestamp,filename\n";
+  for (int k = 0; k < support::kSmallFrames; ++k) {
+    const fs::path stamp = fs::path(support::small_image_name(k)).stem();
+    list += stamp.string() + ",data/" + stamp.string() + ".png\n";
+    fs::rename(image(k), image(k).replace_extension(".jpg"));
+  }
+  support::write_text(camera(0) / "data.csv", list);
+  const auto dataset = open();
+  ASSERT_TRUE(dataset) << dataset.error().message();
+  ASSERT_EQ(dataset->frames.size(), static_cast<std::size_t>(support::kSmallFrames));
+  EXPECT_EQ(dataset->frames[7].images[0]->path, image(7).replace_extension(".jpg"));
+  EXPECT_TRUE(dataset->warnings.empty());
 }
 
 TEST_F(SmallEuroc, ListContainsWords) {
