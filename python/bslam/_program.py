@@ -134,7 +134,8 @@ def calibrate(
         model: begin with this camera model without distortion for all cameras; needs `fov`.
         fov: horizontal field of view in degrees; needs `model`.
         format: data set format.
-        topics: image topics of a bag or folders of images, in the order of the rig's cameras; default: all, by name.
+        topics: image topics of a bag or folders of images, in the order of the rig's cameras; default: those that the rig
+            file names, or all, by name.
         side_by_side: each image of the video consists of those of two cameras.
         cameras: cameras of the rig to use, in this order; default: all.
         begin: start of the interval to process, in seconds after the first image.

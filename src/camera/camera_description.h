@@ -60,6 +60,8 @@ struct RigReading {
   std::vector<RigCamera> cameras;
   std::vector<std::string> notes;
   geometry::SE3 T_cam0_rig = {};  // see Rig
+  // The topics of the images of all cameras, each of which may be empty; none if the format does not name them.
+  std::vector<std::string> topics = {};
 };
 
 }  // namespace bslam::camera

@@ -45,7 +45,7 @@ void add_image_options(CLI::App& verb, ImageArguments& a) {
   verb.add_option(
       "--topics", a.topics,
       "image topics of a bag, or folders with images in DATA, in the order of the rig's cameras, separated by "
-      "commas; default: all, by name");
+      "commas; default: those that the rig file names, or all, by name");
   verb.add_flag("--side-by-side", a.side_by_side, "each image of the video consists of those of two cameras");
   verb.add_option("--rate", a.rate_hz, "frame rate in Hz; the time stamps of the images are frame numbers");
   verb.add_option("--stamp-unit", a.stamp_unit, "unit of the time stamps; default: ns")

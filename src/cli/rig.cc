@@ -10,8 +10,10 @@
 #include "cli/dataset_arguments.h"
 #include "cli/print_message.h"
 #include "cli/verbs.h"
+#include "dataset/rosbag2_folder.h"
 #include "rig_formats/rig_file.h"
 #include "session/rig_report.h"
+#include "session/rig_source.h"
 
 namespace bslam::cli {
 namespace {
@@ -20,6 +22,7 @@ struct ConvertArguments {
   std::vector<std::string> files;  // the last one is written
   std::string to;
   std::vector<std::string> drop;
+  std::string topics;
   bool overwrite = false;
 };
 
@@ -70,6 +73,10 @@ Status check_converted(const std::vector<std::filesystem::path>& inputs,
   for (const std::filesystem::path& input : inputs) {
     const std::vector<std::filesystem::path> files = rig_formats::files_of_rig(input);
     read.insert(read.end(), files.begin(), files.end());
+    if (const auto bag = dataset::files_of_rosbag2(input)) {
+      read.insert(read.end(), bag->files.begin(), bag->files.end());
+      read.push_back(input / "metadata.yaml");
+    }
   }
   for (const std::filesystem::path& file : outputs) {
     if (Status other = check_not_input(file, "", read); !other) return other;
@@ -77,10 +84,24 @@ Status check_converted(const std::vector<std::filesystem::path>& inputs,
   return {};
 }
 
+// Reads a calibration, or that of these topics of a recording.
+Result<rig_formats::RigFile> read_input(const std::filesystem::path& file, const std::string& topics) {
+  if (rig_formats::is_saved_map(file)) return rig_formats::read_rig_file(file);
+  dataset::DatasetRequest recording{.path = file};
+  ImageArguments images;
+  images.topics = topics;
+  if (const Status s = apply_image_options(images, recording); !s) return s.error();
+  auto source = session::read_rig_source(recording);
+  if (!source) return source.error();
+  if (topics.empty() || source->of_recording) return std::move(source->file);
+  return Error{"--topics", "", "a calibration file", "a recording, of which the topics are"};
+}
+
 int rig_convert(const ConvertArguments& arguments) {
   const std::vector<std::filesystem::path> inputs(arguments.files.begin(), arguments.files.end() - 1);
   const std::string& out = arguments.files.back();
-  auto in = rig_formats::read_joined_rigs(inputs);
+  auto in = rig_formats::read_joined_rigs(
+      inputs, [&](const std::filesystem::path& file) { return read_input(file, arguments.topics); });
   if (!in) return report_error(in.error());
   rig_formats::RigFormat format = rig_formats::format_of_output(out);
   if (!arguments.to.empty()) {
@@ -96,7 +117,7 @@ int rig_convert(const ConvertArguments& arguments) {
   if (!there.empty() && !arguments.overwrite) {
     return report_error({there.front().string(), "", "an existing calibration", "a new name, or --overwrite"});
   }
-  const auto notes = rig_formats::write_rig_as(*rig, format, out);
+  const auto notes = rig_formats::write_rig_as(*rig, format, out, in->topics);
   if (!notes) return report_error(notes.error());
   for (const std::string& note : in->notes) print_message("note: {}\n", note);
   for (const std::string& note : *notes) print_message("note: {}\n", note);
@@ -122,15 +143,17 @@ void add_convert(CLI::App& rig, int& exit_status) {
   const auto arguments = std::make_shared<ConvertArguments>();
   CLI::App* convert = rig.add_subcommand("convert", "write a calibration in another format");
   convert
-      ->add_option(
-          "IN... OUT", arguments->files,
-          "IN: a calibration, or the folder of a data set; several are joined by their common body frame. OUT: "
-          "a file (.json: basalt, else bslam), or a folder (euroc); the name of a new folder must end in /")
+      ->add_option("IN... OUT", arguments->files,
+                   "IN: a calibration, the folder of a data set, or a recording with CameraInfo; several are joined by "
+                   "their common body frame. OUT: "
+                   "a file (.json: basalt, else bslam), or a folder (euroc); the name of a new folder must end in /")
       ->required()
       ->expected(2, 100);
   convert->add_option("--to", arguments->to, "format of OUT: " + joined_formats());
   convert->add_option("--drop", arguments->drop,
                       "omit content that the format cannot store: body, mask, rolling-shutter, time-offset");
+  convert->add_option("--topics", arguments->topics,
+                      "image topics of the recording IN whose cameras are written, separated by commas; default: all");
   convert->add_flag("--overwrite", arguments->overwrite, "replace an existing calibration");
   convert->callback([arguments, &exit_status] { exit_status = rig_convert(*arguments); });
 }

@@ -66,9 +66,10 @@ void print_sources(const dataset::Dataset& dataset) {
     text += (c == 0 ? "" : ", ") + dataset.rig.camera(c).name + " = " + dataset.sources[c];
   }
   const bool folders = dataset.format == dataset::DatasetFormat::kFolder;
-  const char* const how = dataset.sources_by_name ? "by their names"
-                          : folders               ? "in the order of their names; choose with --topics"
-                                                  : "choose with --topics";
+  const char* const how = dataset.sources_by_topic  ? "by the topics that the calibration names"
+                          : dataset.sources_by_name ? "by their names"
+                          : folders                 ? "in the order of their names; choose with --topics"
+                                                    : "choose with --topics";
   if (!text.empty()) print_message("cameras: {} ({})\n", text, how);
 }
 

@@ -9,7 +9,7 @@
 #include <system_error>
 #include <utility>
 
-#include "rig_formats/rig_file.h"
+#include "dataset/topic_names.h"
 
 namespace bslam::dataset {
 namespace {
@@ -41,6 +41,30 @@ std::optional<CameraPlaces> places_by_name(const std::vector<std::string>& folde
     if (std::ranges::any_of(places.of_cameras, is_found)) return places;
   }
   return std::nullopt;
+}
+
+// The result of looking for the topics that a rig file names.
+struct TopicSearch {
+  std::optional<CameraPlaces> places;  // if the topics of all selected cameras were found
+  std::string problem = {};            // otherwise, if any was found
+};
+
+TopicSearch places_by_topic(const rig_formats::RigFile& file, const Recording& recording,
+                            const std::vector<int>& cameras) {
+  std::vector<std::string> recorded = recording.topics();
+  for (std::string& topic : recorded) topic = plain_topic(topic);
+  CameraPlaces places;
+  for (const std::string& topic : file.topics) places.of_cameras.push_back(place_of(plain_topic(topic), recorded));
+  if (std::ranges::none_of(places.of_cameras, is_found)) return {};
+  for (const int camera : cameras) {
+    const auto c = static_cast<std::size_t>(camera);
+    const std::string& topic = file.topics[c];
+    if (topic.empty()) return {{}, fmt::format("it names none for {}", file.rig.camera(c).name)};
+    if (!places.has(camera)) return {{}, fmt::format("the recording has no images of {}", topic)};
+    if (std::ranges::count(places.of_cameras, places.of_cameras[c]) > 1)
+      return {{}, fmt::format("it names {} for more than one camera", topic)};
+  }
+  return {std::move(places)};
 }
 
 // Returns true if the numbers may be those of the cameras of the rig: it has all of them, or it is a rig of the first
@@ -183,11 +207,13 @@ std::optional<fs::path> rig_file_in_folder(const DatasetRequest& request) {
 }
 
 Result<RecordedCameras> recorded_cameras(const DatasetRequest& request, const Recording& recording,
-                                         const camera::Rig& rig, const std::vector<int>& cameras) {
+                                         const rig_formats::RigFile& file, const std::vector<int>& cameras) {
+  const camera::Rig& rig = file.rig;
   const std::vector<std::string> topics = recording.topics();
+  const TopicSearch by_topic = places_by_topic(file, recording, cameras);
   const auto folders = request.topics.empty() ? recording.folder_names() : std::vector<std::string>();
   const std::vector<int> numbers = recording.recorded_numbers();
-  auto places = places_by_name(folders, recording, rig);
+  auto places = by_topic.places ? by_topic.places : places_by_name(folders, recording, rig);
   const auto has = [&](int camera) { return places->has(camera); };
   const bool all_named = places && std::ranges::all_of(cameras, has);
   if (!all_named && topics.size() > rig.size()) return unknown_topics(request, topics, rig);
@@ -198,7 +224,12 @@ Result<RecordedCameras> recorded_cameras(const DatasetRequest& request, const Re
   const auto by_number = places_by_number(numbers, rig);
   if (!all_named && by_number && (!places || agree(*places, *by_number))) places = by_number;
   if (!places && !numbers.empty() && numbers.size() != rig.size()) return other_numbers(request, numbers, rig);
-  RecordedCameras out{.numbers = {}, .by_name = places && places->by_name};
+  RecordedCameras out{.numbers = {}, .by_name = places && places->by_name, .by_topic = by_topic.places.has_value()};
+  if (!by_topic.problem.empty()) {
+    out.warning =
+        fmt::format("{}: the topics that it names for its cameras are not used, since {}; choose with --topics",
+                    origin_of(request), by_topic.problem);
+  }
   for (const int camera : cameras) {
     const int in_order = only_selected ? static_cast<int>(out.numbers.size()) : camera;
     const int place = places ? places->of_cameras[static_cast<std::size_t>(camera)] : in_order;
@@ -210,17 +241,21 @@ Result<RecordedCameras> recorded_cameras(const DatasetRequest& request, const Re
 }
 
 Result<ChosenRig> choose_given(const DatasetRequest& request, const Recording& recording) {
-  const auto rig = request.rig_file ? rig_formats::read_rig(*request.rig_file) : Result(*request.rig_of_map);
-  if (!rig) return rig.error();
+  const auto file = request.rig_file ? rig_formats::read_rig_file(*request.rig_file)
+                                     : Result(rig_formats::RigFile{*request.rig_of_map, {}, {}});
+  if (!file) return file.error();
+  const camera::Rig* const rig = &file->rig;
   const auto cameras = chosen_cameras(request.cameras, rig->size());
   if (!cameras) return cameras.error();
-  const auto recorded = recorded_cameras(request, recording, *rig, *cameras);
+  const auto recorded = recorded_cameras(request, recording, *file, *cameras);
   if (!recorded) return recorded.error();
   if (!request.rig_file && !recorded->by_name && request.topics.empty() && recording.camera_count() != rig->size())
     return Error{request.path.string(), "", fmt::format("images of {} cameras", recording.camera_count()),
                  fmt::format("those of the map's cameras ({}): name them in this order with --topics, or give --rig",
                              names_of(*rig))};
-  ChosenRig chosen{*cameras, rig->subset(*cameras), *rig, {}, recorded->numbers, recorded->by_name};
+  ChosenRig chosen{*cameras,          rig->subset(*cameras), *rig,        {}, recorded->numbers,
+                   recorded->by_name, recorded->by_topic,    file->topics};
+  if (!recorded->warning.empty()) chosen.warnings.push_back(recorded->warning);
   if (recording.camera_count() > rig->size()) {
     chosen.warnings.push_back(
         fmt::format("{} has {} cameras but the data set has {}; the additional cameras are not used",

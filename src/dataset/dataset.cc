@@ -298,6 +298,8 @@ Result<Dataset> dataset_of(const DatasetRequest& original, const OpenRecording& 
     dataset.sources.push_back(image.store ? image.store->stream(image.entry) : image_files::source_of(image));
   }
   dataset.sources_by_name = chosen->by_name;
+  dataset.sources_by_topic = chosen->by_topic;
+  dataset.rig_topics = std::move(chosen->rig_topics);
   if (const Status status = describe_pixels(request, *images, dataset); !status) return status.error();
   if (!request.rig_file) number_as_recorded(recording, dataset);
   if (const Status status = group(request, *images, dataset); !status) return status.error();

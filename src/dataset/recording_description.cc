@@ -147,13 +147,14 @@ std::optional<std::vector<int>> cameras_of_run(const DatasetRequest& request, co
     const auto cameras = chosen_cameras(request.cameras, recording.camera_count());
     return cameras ? std::optional(*cameras) : std::nullopt;
   }
-  const auto rig = rig_formats::read_rig(*with_rig.rig_file);
-  if (!rig) return std::nullopt;
-  const auto cameras = chosen_cameras(request.cameras, rig->size());
+  const auto file = rig_formats::read_rig_file(*with_rig.rig_file);
+  if (!file) return std::nullopt;
+  const camera::Rig& rig = file->rig;
+  const auto cameras = chosen_cameras(request.cameras, rig.size());
   if (!cameras) return std::nullopt;
-  const auto recorded = recorded_cameras(with_rig, recording, *rig, *cameras);
+  const auto recorded = recorded_cameras(with_rig, recording, *file, *cameras);
   if (recorded) return recorded->numbers;
-  if (recording.has_own_names() || recording.topics().size() > rig->size())
+  if (recording.has_own_names() || recording.topics().size() > rig.size())
     out.missing.push_back(recorded.error().message());
   return std::nullopt;
 }

@@ -12,6 +12,11 @@ std::string without_transport(std::string topic) {
   return topic;
 }
 
+std::string plain_topic(std::string topic) {
+  topic = without_transport(std::move(topic));
+  return topic.starts_with('/') ? topic.substr(1) : topic;
+}
+
 std::string namespace_of(std::string topic) {
   topic = without_transport(std::move(topic));
   const std::size_t slash = topic.rfind('/');

@@ -8,6 +8,9 @@ namespace bslam::dataset {
 // "/cam0/image_raw/compressed" -> "/cam0/image_raw", the topic of which it is a copy.
 std::string without_transport(std::string topic);
 
+// "/cam0/image_raw/compressed" -> "cam0/image_raw", the same for all ways to write the topic of these images.
+std::string plain_topic(std::string topic);
+
 // "/cam0/image_raw/compressed" -> "/cam0", where the calibration of its camera is as well.
 std::string namespace_of(std::string topic);
 

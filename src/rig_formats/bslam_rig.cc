@@ -99,9 +99,9 @@ Result<std::vector<double>> read_pose(const yaml::YamlMap& yaml) {
 Result<camera::RigCamera> read_camera(const yaml::YamlMap& yaml, std::size_t index) {
   if (yaml.has("T_cam_body"))
     return yaml.error("T_cam_body", "the transform from body to camera", "T_body_cam, its inverse");
-  const Status known =
-      yaml.allow_only({"name", "model", "resolution", "intrinsics", "distortion", "T_body_cam", "position",
-                       "quaternion_xyzw", "yaw_pitch_roll_deg", "time_offset_s", "rolling_shutter_readout_s", "mask"});
+  const Status known = yaml.allow_only({"name", "model", "resolution", "intrinsics", "distortion", "T_body_cam",
+                                        "position", "quaternion_xyzw", "yaw_pitch_roll_deg", "time_offset_s",
+                                        "rolling_shutter_readout_s", "mask", "topic"});
   if (!known) return known.error();
   camera::CameraDescription d;
   d.name = fmt::format("cam{}", index);
@@ -153,7 +153,7 @@ std::string transform_to_yaml(const geometry::SE3& transform, int indent) {
   return yaml;
 }
 
-std::string camera_to_yaml(const camera::Camera& camera, const geometry::SE3& T_body_cam) {
+std::string camera_to_yaml(const camera::Camera& camera, const geometry::SE3& T_body_cam, const std::string& topic) {
   const camera::Intrinsics& k = camera::intrinsics(camera.model);
   std::string yaml =
       fmt::format("  - name: {}\n    model: {}\n    resolution: [{}, {}]\n", yaml::yaml_quoted(camera.name),
@@ -166,6 +166,7 @@ std::string camera_to_yaml(const camera::Camera& camera, const geometry::SE3& T_
   yaml += fmt::format("    time_offset_s: {}\n", format_double(static_cast<double>(camera.time_offset_ns) / 1e9));
   if (camera.readout_s != 0)
     yaml += fmt::format("    rolling_shutter_readout_s: {}\n", format_double(camera.readout_s));
+  if (!topic.empty()) yaml += fmt::format("    topic: {}\n", yaml::yaml_quoted(topic));
   return yaml + fmt::format("    mask: {}\n", camera.mask_file.empty() ? "null" : yaml::yaml_quoted(camera.mask_file));
 }
 
@@ -190,6 +191,9 @@ Result<camera::RigReading> read_bslam_rig(const fs::path& file, const std::strin
       return map.error("name", camera->camera.name + " for a second camera", "a different name for each camera");
     }
     reading.cameras.push_back(*std::move(camera));
+    const auto topic = map.has("topic") ? map.text("topic") : Result(std::string());
+    if (!topic) return topic.error();
+    reading.topics.push_back(*topic);
   }
   if (yaml.has("T_cam0_rig")) {
     const auto T_cam0_rig = read_turn(yaml);
@@ -199,7 +203,7 @@ Result<camera::RigReading> read_bslam_rig(const fs::path& file, const std::strin
   return reading;
 }
 
-std::string rig_to_yaml(const camera::Rig& rig) {
+std::string rig_to_yaml(const camera::Rig& rig, const std::vector<std::string>& topics) {
   std::string yaml = fmt::format("bslam_rig: {}\n", kRigVersion);
   const geometry::SE3& T_cam0_rig = rig.cam_from_rig(0);
   if (!T_cam0_rig.matrix().isIdentity(0)) {
@@ -207,7 +211,8 @@ std::string rig_to_yaml(const camera::Rig& rig) {
     yaml += transform_to_yaml(T_cam0_rig, 2);
   }
   yaml += "cameras:\n";
-  for (std::size_t i = 0; i < rig.size(); ++i) yaml += camera_to_yaml(rig.camera(i), rig.body_from_cam(i));
+  for (std::size_t i = 0; i < rig.size(); ++i)
+    yaml += camera_to_yaml(rig.camera(i), rig.body_from_cam(i), i < topics.size() ? topics[i] : "");
   return yaml;
 }
 

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "camera/camera_description.h"
 
@@ -13,7 +14,7 @@ namespace bslam::rig_formats {
 Result<camera::RigReading> read_bslam_rig(const std::filesystem::path& file, const std::string& text);
 
 // Returns the rig as YAML. The format stores everything a rig contains, and reading it back gives exactly the same rig.
-// Paths of masks are written unchanged.
-std::string rig_to_yaml(const camera::Rig& rig);
+// Paths of masks are written unchanged. `topics`: see camera::RigReading.
+std::string rig_to_yaml(const camera::Rig& rig, const std::vector<std::string>& topics = {});
 
 }  // namespace bslam::rig_formats

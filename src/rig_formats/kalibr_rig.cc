@@ -199,17 +199,20 @@ std::string transform_text(const char* key, const SE3& T) {
   return text;
 }
 
-std::string camera_text(const camera::Rig& rig, std::size_t i, const KalibrNumbers& numbers) {
+std::string camera_text(const camera::Rig& rig, std::size_t i, const KalibrNumbers& numbers,
+                        const std::vector<std::string>& topics) {
   const camera::Camera& camera = rig.camera(i);
   std::vector<std::size_t> overlaps;
   for (std::size_t j = 0; j < rig.size(); ++j) {
     if (j != i && rig.overlap(i, j)) overlaps.push_back(j);
   }
+  const bool has_topic = i < topics.size() && !topics[i].empty();
   return fmt::format(
       "  cam_overlaps: [{}]\n  camera_model: {}\n  distortion_coeffs: {}\n  distortion_model: {}\n  intrinsics: {}\n"
-      "  resolution: [{}, {}]\n  rostopic: /cam{}/image_raw\n  timeshift_cam_imu: {}\n",
+      "  resolution: [{}, {}]\n  rostopic: {}\n  timeshift_cam_imu: {}\n",
       fmt::join(overlaps, ", "), numbers.model, number_list(numbers.coefficients), numbers.distortion_model,
-      number_list(numbers.intrinsics), camera.width, camera.height, i,
+      number_list(numbers.intrinsics), camera.width, camera.height,
+      has_topic ? yaml::yaml_quoted(topics[i]) : fmt::format("/cam{}/image_raw", i),
       format_double(static_cast<double>(camera.time_offset_ns) / 1e9));
 }
 
@@ -234,6 +237,8 @@ Result<camera::RigReading> read_kalibr_rig(const fs::path& file, const std::stri
     if (!camera) return camera.error();
     before = camera->T_body_cam;
     reading.cameras.push_back(*std::move(camera));
+    const auto topic = map->text("rostopic");
+    reading.topics.push_back(topic ? *topic : "");
   }
   if (reading.cameras.empty()) return yaml->error("cam0", "nothing", "the first camera of the chain");
   constexpr std::size_t kLargestGap = 100;
@@ -248,7 +253,8 @@ Result<camera::RigReading> read_kalibr_rig(const fs::path& file, const std::stri
   return reading;
 }
 
-Result<std::string> kalibr_rig_text(const camera::Rig& rig, const std::string& out) {
+Result<std::string> kalibr_rig_text(const camera::Rig& rig, const std::string& out,
+                                    const std::vector<std::string>& topics) {
   const RigLimits limits{.format = "Kalibr's camchain",
                          .models = {camera::Pinhole::kName, camera::PinholeRadTan::kName, camera::KannalaBrandt::kName,
                                     camera::Unified::kName, camera::ExtendedUnified::kName, camera::DoubleSphere::kName,
@@ -264,12 +270,13 @@ Result<std::string> kalibr_rig_text(const camera::Rig& rig, const std::string& o
     }
     text += fmt::format("cam{}:\n", i) + transform_text("T_cam_imu", rig.body_from_cam(i).inverse());
     if (i > 0) text += transform_text("T_cn_cnm1", rig.body_from_cam(i).inverse() * rig.body_from_cam(i - 1));
-    text += camera_text(rig, i, numbers_of(model));
+    text += camera_text(rig, i, numbers_of(model), topics);
   }
   return text;
 }
 
-Result<std::string> openvins_rig_text(const camera::Rig& rig, const std::string& out) {
+Result<std::string> openvins_rig_text(const camera::Rig& rig, const std::string& out,
+                                      const std::vector<std::string>& topics) {
   const RigLimits limits{.format = "OpenVINS's camera chain",
                          .models = {camera::Pinhole::kName, camera::PinholeRadTan::kName, camera::KannalaBrandt::kName},
                          .time_offsets = Supports::kEach,
@@ -282,8 +289,8 @@ Result<std::string> openvins_rig_text(const camera::Rig& rig, const std::string&
       numbers.distortion_model = "radtan";
       numbers.coefficients.assign(4, 0.0);
     }
-    text +=
-        fmt::format("cam{}:\n", i) + transform_text("T_imu_cam", rig.body_from_cam(i)) + camera_text(rig, i, numbers);
+    text += fmt::format("cam{}:\n", i) + transform_text("T_imu_cam", rig.body_from_cam(i)) +
+            camera_text(rig, i, numbers, topics);
   }
   return text;
 }

@@ -29,6 +29,7 @@ namespace fs = std::filesystem;
 constexpr std::size_t kMaxRigBytes = std::size_t{1} << 22;
 constexpr const char* kSensor = "sensor.yaml";      // of a camera in EuRoC layout
 constexpr std::string_view kMapBegin = "BSLAMMAP";  // docs/map_file.md
+constexpr std::array<std::string_view, 3> kRecordingBegins = {"#ROSBAG V", "\x89MCAP", "SQLite format 3"};
 
 Result<camera::RigReading> read_euroc_file(const fs::path& file, const std::string&) {
   const std::string folder = fs::absolute(file).parent_path().filename().string();
@@ -119,11 +120,39 @@ constexpr std::array kWritable = {RigFormat::kBslam,    RigFormat::kEuroc,  RigF
 
 Result<RigFile> as_file(Result<camera::RigReading> reading, RigFormat format) {
   if (!reading) return reading.error();
-  return RigFile{camera::Rig(std::move(reading->cameras), reading->T_cam0_rig), format, std::move(reading->notes)};
+  return RigFile{camera::Rig(std::move(reading->cameras), reading->T_cam0_rig), format, std::move(reading->notes),
+                 std::move(reading->topics)};
+}
+
+bool begins_with(const fs::path& file, std::string_view text) {
+  std::error_code error;
+  if (!fs::is_regular_file(file, error)) return false;
+  std::string begin(text.size(), '\0');
+  std::ifstream stream(file, std::ios::binary);
+  return stream.read(begin.data(), static_cast<std::streamsize>(begin.size())) && begin == text;
+}
+
+// Bags and MCAP files, and folders with them.
+bool is_recording(const fs::path& file) {
+  return std::ranges::any_of(kRecordingBegins, [&](std::string_view begin) { return begins_with(file, begin); });
+}
+
+bool holds_recording(const fs::path& folder) {
+  std::error_code error;
+  for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
+    if (is_recording(it->path())) return true;
+  }
+  return false;
+}
+
+Error recording_instead(const fs::path& path) {
+  return {path.string(), "", "a recording",
+          "a calibration; bslam rig convert RECORDING rig.yaml writes that of its CameraInfo to a file"};
 }
 
 Result<RigFile> read_folder(const fs::path& folder) {
   const std::vector<fs::path> files = files_of_rig(folder);
+  if (files.empty() && holds_recording(folder)) return recording_instead(folder);
   if (files.empty()) {
     return Error{folder.string(), "", "a folder without a calibration",
                  "a folder with mav0/camN/sensor.yaml, calib.txt, calib_cam_to_cam.txt, cameras.txt or rig.yaml"};
@@ -163,15 +192,15 @@ Status write_colmap(const camera::Rig& rig, const fs::path& folder) {
   return {};
 }
 
-Status write_as(const camera::Rig& rig, RigFormat format, const fs::path& out) {
+Status write_as(const camera::Rig& rig, RigFormat format, const fs::path& out, const std::vector<std::string>& topics) {
   constexpr double kRateHz = 20.0;  // files of EuRoC contain a rate, which is not used
   switch (format) {
     case RigFormat::kEuroc:
       return write_euroc_sensors(rig, out, kRateHz);
     case RigFormat::kKalibr:
-      return write_text(kalibr_rig_text(rig, out.string()), out);
+      return write_text(kalibr_rig_text(rig, out.string(), topics), out);
     case RigFormat::kOpenvins:
-      return write_text(openvins_rig_text(rig, out.string()), out);
+      return write_text(openvins_rig_text(rig, out.string(), topics), out);
     case RigFormat::kOrbslam3:
       return write_text(orbslam_rig_text(rig, out.string()), out);
     case RigFormat::kOkvis2:
@@ -181,7 +210,7 @@ Status write_as(const camera::Rig& rig, RigFormat format, const fs::path& out) {
     case RigFormat::kColmap:
       return write_colmap(rig, out);
     case RigFormat::kBslam:
-      return write_rig(rig, out);
+      return write_atomically(out, rig_to_yaml(rig, topics));
     case RigFormat::kKitti:
     case RigFormat::kKittiRaw:
       break;
@@ -209,19 +238,14 @@ RigFormat format_of_output(const fs::path& out) {
   return out.extension() == ".json" ? RigFormat::kBasalt : RigFormat::kBslam;
 }
 
-bool is_saved_map(const fs::path& file) {
-  std::error_code error;
-  if (!fs::is_regular_file(file, error)) return false;
-  std::string begin(kMapBegin.size(), '\0');
-  std::ifstream stream(file, std::ios::binary);
-  return stream.read(begin.data(), static_cast<std::streamsize>(begin.size())) && begin == kMapBegin;
-}
+bool is_saved_map(const fs::path& file) { return begins_with(file, kMapBegin); }
 
 Result<RigFile> read_rig_file(const fs::path& path) {
   std::error_code error;
   if (fs::is_directory(path, error)) return read_folder(path);
   if (is_saved_map(path))
     return Error{path.string(), "", "a saved map", "a calibration; bslam rig info FILE shows the cameras of a map"};
+  if (is_recording(path)) return recording_instead(path);
   auto text = read_text(path, kMaxRigBytes);
   if (!text) return text.error();
   std::string names;
@@ -247,12 +271,12 @@ std::vector<fs::path> files_of_rig(const fs::path& path) {
   return files;
 }
 
-Result<RigFile> read_joined_rigs(std::span<const fs::path> files) {
+Result<RigFile> read_joined_rigs(std::span<const fs::path> files, const RigReader& read) {
   std::vector<camera::RigCamera> cameras;
-  std::vector<std::string> notes;
+  std::vector<std::string> notes, topics;
   std::optional<RigFile> first;
   for (const fs::path& file : files) {
-    auto part = read_rig_file(file);
+    auto part = read(file);
     if (!part) return part.error();
     if (files.size() > 1 && part->rig.body_from_cam(0).matrix().isIdentity(0)) {
       return Error{file.string(), "", "extrinsics relative to its camera 0 only",
@@ -264,10 +288,12 @@ Result<RigFile> read_joined_rigs(std::span<const fs::path> files) {
       cameras.push_back(std::move(camera));
     }
     notes.insert(notes.end(), part->notes.begin(), part->notes.end());
+    topics.insert(topics.end(), part->topics.begin(), part->topics.end());
+    topics.resize(cameras.size());
     if (!first) first = std::move(*part);
   }
   if (files.size() == 1) return *std::move(first);
-  return RigFile{camera::Rig(std::move(cameras)), first->format, std::move(notes)};
+  return RigFile{camera::Rig(std::move(cameras)), first->format, std::move(notes), std::move(topics)};
 }
 
 Result<camera::Rig> read_rig(const fs::path& path) {
@@ -278,8 +304,9 @@ Result<camera::Rig> read_rig(const fs::path& path) {
 
 Status write_rig(const camera::Rig& rig, const fs::path& file) { return write_atomically(file, rig_to_yaml(rig)); }
 
-Result<std::vector<std::string>> write_rig_as(const camera::Rig& rig, RigFormat format, const fs::path& out) {
-  if (const Status status = write_as(rig, format, out); !status) return status.error();
+Result<std::vector<std::string>> write_rig_as(const camera::Rig& rig, RigFormat format, const fs::path& out,
+                                              const std::vector<std::string>& topics) {
+  if (const Status status = write_as(rig, format, out, topics); !status) return status.error();
   std::vector<std::string> notes;
   const bool keeps_names = format == RigFormat::kBslam || format == RigFormat::kColmap;
   for (std::size_t i = 0; i < rig.size() && !keeps_names; ++i) {

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -30,7 +31,8 @@ RigFormat format_of_output(const std::filesystem::path& out);
 struct RigFile {
   camera::Rig rig;
   RigFormat format;
-  std::vector<std::string> notes;  // how ambiguous content of the file was interpreted
+  std::vector<std::string> notes;        // how ambiguous content of the file was interpreted
+  std::vector<std::string> topics = {};  // see camera::RigReading
 };
 
 // Returns true if the file begins like a saved map, which is no calibration, but contains one.
@@ -48,17 +50,21 @@ Result<camera::Rig> read_rig(const std::filesystem::path& path);
 std::vector<std::filesystem::path> files_of_rig(const std::filesystem::path& path);
 
 // Joins calibrations of parts of a rig, such as the camchains of several runs of Kalibr, by their common body frame, in
-// the order of the files. A name that is taken becomes camN, N being the index of the camera. Errors: as for
-// read_rig_file; the body frame of one of several files is its camera 0, so that the files have no common frame.
-Result<RigFile> read_joined_rigs(std::span<const std::filesystem::path> files);
+// the order of the files, which `read` reads. A name that is taken becomes camN, N being the index of the camera.
+// Errors: those of `read`; the body frame of one of several files is its camera 0, so that the files have no common
+// frame.
+using RigReader = std::function<Result<RigFile>(const std::filesystem::path&)>;
+Result<RigFile> read_joined_rigs(std::span<const std::filesystem::path> files, const RigReader& read = read_rig_file);
 
 Status write_rig(const camera::Rig& rig, const std::filesystem::path& file);  // writes the format of bslam
 
 // Writes `out`, which is a file, or, for EuRoC and COLMAP, a folder that is created. Returns notes on content that was
 // not stored but does not affect a run (camera names). Errors: content that the format cannot store
-// (rig_formats/rig_limits.h); a file that cannot be written.
+// (rig_formats/rig_limits.h); a file that cannot be written. `topics`: see camera::RigReading; they are stored by the
+// formats of bslam, Kalibr and OpenVINS.
 Result<std::vector<std::string>> write_rig_as(const camera::Rig& rig, RigFormat format,
-                                              const std::filesystem::path& out);
+                                              const std::filesystem::path& out,
+                                              const std::vector<std::string>& topics = {});
 // The files that it writes for a rig of so many cameras.
 std::vector<std::filesystem::path> files_written(RigFormat format, const std::filesystem::path& out,
                                                  std::size_t cameras);

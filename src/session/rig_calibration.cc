@@ -171,7 +171,8 @@ Result<RigCalibration> calibrate_rig(std::span<const dataset::Dataset> recording
   camera::Rig whole =
       first.whole_rig ? first.whole_rig->with_calibration_of(joint->rig, first.cameras_used) : joint->rig;
   const double scale_std = scale_deviation(start, request.config.calibration);
-  return RigCalibration{start, *std::move(joint), runs, converged, scale_std, std::move(whole), std::move(moves)};
+  return RigCalibration{
+      start, *std::move(joint), runs, converged, scale_std, std::move(whole), std::move(moves), first.rig_topics};
 }
 
 }  // namespace bslam::session

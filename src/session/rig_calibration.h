@@ -39,6 +39,7 @@ struct RigCalibration {
   double scale_std = 0;
   camera::Rig whole;  // `joint.rig` together with the cameras of the calibration that were not used
   std::vector<MoveInRecording> moves = {};
+  std::vector<std::string> topics = {};  // those of the images of `whole`, if the calibration of the start names them
 };
 
 // The configuration of a calibration: sequential, always refined, and with the deviations of a rough start.

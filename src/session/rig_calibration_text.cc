@@ -154,7 +154,7 @@ std::string calibrated_rig_yaml(const RigCalibration& c) {
     out += "# " + text.substr(begin, end - begin) + "\n";
     begin = end + 1;
   }
-  return out + rig_formats::rig_to_yaml(c.whole);
+  return out + rig_formats::rig_to_yaml(c.whole, c.topics);
 }
 
 }  // namespace bslam::session

@@ -9,12 +9,12 @@
 #include "calibration/convention_check.h"
 #include "calibration/rig_description.h"
 #include "calibration/rig_warnings.h"
-#include "dataset/recording.h"
 #include "image_decoding/image_file.h"
 #include "report/rig_plot.h"
 #include "rig_formats/rig_file.h"
 #include "session/image_test.h"
 #include "session/late_camera_json.h"
+#include "session/rig_source.h"
 #include "storage/map_file.h"
 
 namespace bslam::session {
@@ -86,40 +86,16 @@ std::vector<std::string> warnings_of(const camera::Rig& rig) {
   return warnings;
 }
 
-// A calibration and its source.
-struct Calibration {
-  rig_formats::RigFile file;
-  std::string format;
-  bool of_recording = false;  // a bag, with its own calibration
-};
-
 // Reads a calibration file, or the calibration of a bag or of a saved map.
-Result<Calibration> read_calibration(const RigReportRequest& request) {
+Result<RigSource> read_calibration(const RigReportRequest& request) {
   if (request.images.empty() && rig_formats::is_saved_map(request.file)) {
     const auto map = storage::read_map(request.file);
     if (!map) return map.error();
-    return Calibration{{map->map.rig(), rig_formats::RigFormat::kBslam, {}}, "saved map"};
+    return RigSource{{map->map.rig(), rig_formats::RigFormat::kBslam, {}}, "saved map"};
   }
   dataset::DatasetRequest recording = request.recording;
   recording.path = request.file;
-  std::error_code error;
-  const bool is_file = std::filesystem::is_regular_file(request.file, error);
-  const bool has_metadata = std::filesystem::exists(recording.path / "metadata.yaml", error);
-  if (is_file || has_metadata) {
-    const auto opened = dataset::open_recording(recording);
-    if (opened && opened->format == dataset::DatasetFormat::kBag) {
-      const auto dataset = dataset::open_dataset(recording);
-      if (!dataset) return dataset.error();
-      const dataset::Recording& source = *opened->recording;
-      return Calibration{{dataset->rig, rig_formats::RigFormat::kBslam, {}},
-                         source.calibrated() ? source.calibration_origin() : "rig.yaml in the folder of the bag",
-                         true};
-    }
-  }
-  auto file = rig_formats::read_rig_file(request.file);
-  if (!file) return file.error();
-  std::string format(rig_formats::format_name(file->format));
-  return Calibration{*std::move(file), std::move(format)};
+  return read_rig_source(recording);
 }
 
 // The results of the test with the images of a recording.
@@ -128,7 +104,7 @@ struct ImageEvidence {
   std::optional<calibration::LateCamera> late;
 };
 
-std::string as_json(const Calibration& calibration, const std::optional<ImageEvidence>& evidence) {
+std::string as_json(const RigSource& calibration, const std::optional<ImageEvidence>& evidence) {
   const rig_formats::RigFile& file = calibration.file;
   const camera::Rig& rig = file.rig;
   const camera::Rig from_camera_0 = rig.in_frame_of_camera_0();
@@ -155,7 +131,7 @@ std::string as_json(const Calibration& calibration, const std::optional<ImageEvi
   return json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 
-std::string as_text(const Calibration& calibration, const std::optional<ImageEvidence>& evidence) {
+std::string as_text(const RigSource& calibration, const std::optional<ImageEvidence>& evidence) {
   const rig_formats::RigFile& file = calibration.file;
   std::string text = fmt::format("format: {}\n", calibration.format) + calibration::describe_rig(file.rig);
   for (const std::string& note : file.notes) text += "note: " + note + "\n";

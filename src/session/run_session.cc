@@ -271,6 +271,7 @@ Result<SessionResult> run_session(const dataset::Dataset& dataset, const Session
   result.rig = system.rig();
   result.calibration = system.calibration();
   if (result.record.calibration.refined) result.refined_rig = with_refined_calibration(*result.rig, dataset);
+  result.refined_topics = dataset.rig_topics;
   result.journal = system.journal();
   measure_memory(options, system, *fed, result);
   return result;
@@ -328,7 +329,8 @@ Files output_files(const SessionResult& result, const system::Config& config) {
                    files);
   files.emplace_back("covariance_live.csv", covariance_text(result.record, result.subtracted_ns.value_or(0)));
   files.emplace_back("config.yaml", yaml::config_to_yaml(table));
-  if (result.refined_rig) files.emplace_back("rig_refined.yaml", rig_formats::rig_to_yaml(*result.refined_rig));
+  if (result.refined_rig)
+    files.emplace_back("rig_refined.yaml", rig_formats::rig_to_yaml(*result.refined_rig, result.refined_topics));
   const evaluation::Trajectory path =
       result.trajectories.empty() ? evaluation::Trajectory() : result.trajectories.front().poses;
   files.emplace_back("trajectory.svg", report::trajectory_plot_svg({.title = result.record.data + ": path of camera 0",

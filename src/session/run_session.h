@@ -52,6 +52,7 @@ struct SessionResult {
   // If the calibration was refined and the estimate applies (CalibrationRecord::refined): the calibration of all
   // cameras, with the estimate for those in use.
   std::optional<camera::Rig> refined_rig;
+  std::vector<std::string> refined_topics = {};  // the topics that the calibration names for them
   execution::Journal journal;
   // If set: subtracted from the times of all poses and covariances that are written, so that they are time stamps of
   // images. The times of frames contain the time offset of camera 0.

@@ -4,7 +4,9 @@
 #include <map>
 
 #include "dataset/dataset.h"
+#include "dataset/recording_description.h"
 #include "rig_formats/euroc_sensor.h"
+#include "rig_formats/rig_file.h"
 #include "support/bag_writer.h"
 #include "support/data_on_disk.h"
 
@@ -177,6 +179,81 @@ TEST_F(TopicsOfABag, AreNotTakenInTheirOrderIfOneHasTheNameOfACamera) {
             refusal("images of x", "images of camera 1 (left) as well, since " + rig_file() +
                                        " has 2 cameras; --cameras 0 selects those that it has, and --topics names the "
                                        "topics of all cameras in their order"));
+}
+
+// A Kalibr camchain, whose cameras are always called cam0, cam1, ... and have the topics of the calibration.
+class TopicsOfACamchain : public TopicsOfABag {
+ protected:
+  using Topics = std::vector<std::string>;
+  Result<Dataset> open_with(const Topics& rostopics, std::vector<int> cameras = {}, Topics requested = {}) const {
+    std::string text;
+    for (std::size_t c = 0; c < rostopics.size(); ++c) {
+      text += "cam" + std::to_string(c) +
+              ":\n  camera_model: pinhole\n  intrinsics: [20, 20, 15.5, 11.5]\n  resolution: [32, 24]\n";
+      if (!rostopics[c].empty()) text += "  rostopic: " + rostopics[c] + "\n";
+      if (c > 0) text += "  T_cn_cnm1: [[1, 0, 0, -0.1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n";
+    }
+    support::write_text(rig_file(), text);
+    return open_dataset(
+        {.path = data(), .rig_file = rig_file(), .topics = std::move(requested), .cameras = std::move(cameras)});
+  }
+  Topics sources(const Topics& rostopics, std::vector<int> cameras = {}, Topics requested = {}) const {
+    const auto dataset = open_with(rostopics, std::move(cameras), std::move(requested));
+    if (!dataset) return {dataset.error().message()};
+    EXPECT_EQ(dataset->warnings, Topics());
+    return dataset->sources;
+  }
+  // The topics, and the reason why those of the camchain are not used.
+  void expect_unused(const Topics& rostopics, const Topics& used, const std::string& reason) const {
+    const auto dataset = open_with(rostopics);
+    ASSERT_TRUE(dataset) << dataset.error().message();
+    EXPECT_EQ(dataset->sources, used);
+    EXPECT_FALSE(dataset->sources_by_topic);
+    EXPECT_EQ(dataset->warnings, Topics{rig_file() + ": the topics that it names for its cameras are not used, since " +
+                                        reason + "; choose with --topics"});
+  }
+};
+
+TEST_F(TopicsOfACamchain, AreThoseOfItsCameras) {
+  const Topics crossed = {"/zfront/image_raw", "/aside/image_raw"};
+  write(crossed);
+  EXPECT_EQ(sources(crossed), crossed);
+  EXPECT_TRUE(open_with(crossed)->sources_by_topic);
+  EXPECT_EQ(sources(crossed, {1}), Topics{crossed[1]});
+  EXPECT_EQ(sources({"zfront/image_raw/compressed", "/aside/image_raw"}), crossed);
+  EXPECT_EQ(sources({"/other/image_raw", crossed[1], crossed[0]}, {2, 1}), crossed);
+  EXPECT_EQ(sources(crossed, {}, {crossed[1], crossed[0]}), (Topics{crossed[1], crossed[0]}));
+  const auto described = describe_recording({.path = data(), .rig_file = rig_file()});
+  for (const StreamDescription& stream : described->streams)
+    EXPECT_EQ(stream.camera, stream.name == crossed[0] ? 0 : 1) << stream.name;
+}
+
+TEST_F(TopicsOfACamchain, CountMoreThanNamesAndLeaveOutOtherTopics) {
+  const Topics crossed = {"/cam1/image_raw", "/cam0/image_raw"};
+  write({"/cam0/image_raw", "/cam1/image_raw"});
+  EXPECT_EQ(sources(crossed), crossed);
+  write({"/cam0/image_raw", "/cam1/image_raw", "/colour/image_raw"});
+  EXPECT_EQ(open_with({"/colour/image_raw", "/cam1/image_raw"})->sources,
+            (Topics{"/colour/image_raw", "/cam1/image_raw"}));
+}
+
+TEST_F(TopicsOfACamchain, AreIgnoredIfTheRecordingHasOthersAndAWarningSaysIfItHasSome) {
+  const Topics recorded = {"/x/image_raw", "/y/image_raw"};
+  write(recorded);
+  EXPECT_EQ(sources({"/b/image_raw", "/a/image_raw"}), recorded);
+  EXPECT_EQ(sources({"", ""}), recorded);
+  expect_unused({"/y/image_raw", "/a/image_raw"}, recorded, "the recording has no images of /a/image_raw");
+  expect_unused({"/y/image_raw", ""}, recorded, "it names none for cam1");
+  expect_unused({"/y/image_raw", "/y/image_raw"}, recorded, "it names /y/image_raw for more than one camera");
+}
+
+TEST_F(TopicsOfACamchain, AreKeptByTheFormatOfBslam) {
+  const Topics crossed = {"/zfront/image_raw", "/aside/image_raw"};
+  write(crossed);
+  ASSERT_TRUE(open_with(crossed));
+  const auto file = rig_formats::read_rig_file(rig_file());
+  support::write_text(rig_file(), rig_formats::rig_to_yaml(file->rig, file->topics));
+  EXPECT_EQ(open_dataset({.path = data(), .rig_file = rig_file()})->sources, crossed);
 }
 
 }  // namespace

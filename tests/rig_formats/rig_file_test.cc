@@ -275,6 +275,19 @@ TEST_F(OwnRigFile, RejectsUnknownFormats) {
   EXPECT_EQ(read_rig(folder_.path() / "empty").error().found, "a folder without a calibration");
 }
 
+TEST_F(OwnRigFile, RejectsRecordingsByTheirContent) {
+  for (const std::string begin : {"#ROSBAG V2.0\n", "\x89MCAP0\r\n", "SQLite format 3"}) {
+    const Result<camera::Rig> file = read(begin + std::string(5 << 20, '\t'));
+    EXPECT_EQ(file.error().found, "a recording");
+    fs::create_directories(folder_.path() / "walk");
+    fs::rename(folder_.path() / "rig.yaml", folder_.path() / "walk" / "walk_0.db3");
+    const auto folder = read_rig(folder_.path() / "walk");
+    EXPECT_EQ(folder.error().message(), (folder_.path() / "walk").string() +
+                                            ": found a recording, expected a calibration; bslam rig convert RECORDING "
+                                            "rig.yaml writes that of its CameraInfo to a file");
+  }
+}
+
 TEST_F(OwnRigFile, RoundTripsExactly) {
   const camera::Rig rig = mixed_rig();
   ASSERT_TRUE(write_rig(rig, folder_.path() / "rig.yaml"));

@@ -232,6 +232,21 @@ cam1:
   resolution: [752, 480]
 )";
 
+// The second camera has no topic.
+TEST_F(RigFormats, KalibrNamesTopicsWhichFormatsWithTopicsKeep) {
+  const auto rig = read_with(kKalibr, "rostopic: /cam0/image_raw", "rostopic: '/front: 1'");
+  ASSERT_TRUE(rig) << rig.error().message();
+  EXPECT_EQ(rig->topics, (std::vector<std::string>{"/front: 1", ""}));
+  const fs::path out = folder_.path() / "out.yaml";
+  ASSERT_TRUE(write_rig_as(rig->rig, RigFormat::kBslam, out, rig->topics));
+  EXPECT_EQ(read_rig_file(out)->topics, rig->topics);
+  ASSERT_TRUE(write_rig_as(rig->rig, RigFormat::kKalibr, out, rig->topics));
+  EXPECT_EQ(read_rig_file(out)->topics, (std::vector<std::string>{"/front: 1", "/cam1/image_raw"}));
+  const auto joined = read_joined_rigs(std::vector<fs::path>{folder_.path() / "rig.yaml", out});
+  ASSERT_TRUE(joined) << joined.error().message();
+  EXPECT_EQ(joined->topics, (std::vector<std::string>{"/front: 1", "", "/front: 1", "/cam1/image_raw"}));
+}
+
 TEST_F(RigFormats, KalibrChainsPosesAndTimeShifts) {
   const auto file = read(kKalibr);
   ASSERT_TRUE(file) << file.error().message();

@@ -16,6 +16,7 @@
 #include "dataset/live_recording.h"
 #include "rig_formats/bslam_rig.h"
 #include "rig_formats/rig_file.h"
+#include "session/rig_source.h"
 #include "simulator/simulation_writer.h"
 #include "storage/small_map.h"
 #include "support/bag_writer.h"
@@ -112,6 +113,11 @@ TEST_F(RigReport, DescribesTheCalibrationOfABag) {
   ASSERT_TRUE(text) << text.error().message();
   EXPECT_NE(text->find("format: CameraInfo of a bag\n2 cameras\n"), std::string::npos) << *text;
   EXPECT_NE(text->find("11.0 cm"), std::string::npos) << *text;
+  // As a file, it can be written in another format.
+  const auto source = read_rig_source({.path = bag});
+  ASSERT_TRUE(source && source->of_recording);
+  EXPECT_NEAR(source->file.rig.rig_from_cam(1).translation().x(), 0.11, 1e-9);
+  EXPECT_EQ(read_rig_source({.path = bag, .topics = {"/cam1/image_raw"}})->file.rig.size(), 1u);
   // The recording of a live run has its rig as an attachment.
   const fs::path recording = folder_ / "live.mcap";
   auto writer = *containers::McapWriter::create(recording);
@@ -131,6 +137,7 @@ TEST_F(RigReport, DescribesTheCalibrationOfABag) {
   messages.resize(1);  // a bag without images
   support::write_text(bag, support::rosbag1_bytes(messages));
   EXPECT_FALSE(report_rig({.file = bag.string()}));
+  EXPECT_NE(read_rig_source({.path = bag}).error().message().find("no image topic"), std::string::npos);
 }
 
 // Renders 0.4 s of two cameras that look ahead.
