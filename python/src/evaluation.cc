@@ -90,13 +90,15 @@ std::optional<geometry::SE3> frame_of_truth(const Arguments& a, const std::strin
                                             const evaluation::TrajectoryComments& estimate) {
   const bool body = a.gt_frame == "body";
   if (a.camera && !a.rig) raise({"evaluate", "camera", "no rig", "rig=FILE, which has the camera"});
-  if (body && estimate.frame == "body") return std::nullopt;
+  const std::string frame = a.camera ? estimate.frame : estimate.frame_of_poses();
+  if (body && frame == "body") return std::nullopt;
   if (!a.rig) {
     if (body) raise({"evaluate", "gt_frame=body", "no rig", "rig=FILE with the pose of the camera on the body"});
     return std::nullopt;
   }
   const camera::Rig rig = value_of(rig_formats::read_rig(*a.rig));
-  const std::size_t camera = camera_of_estimate(a, name, estimate.frame, rig);
+  if (frame == "body" && !a.camera) return rig.body_from_first(0);
+  const std::size_t camera = camera_of_estimate(a, name, frame, rig);
   return (body ? rig.body_from_first(camera) : rig.rig_from_first(camera)).inverse();
 }
 

@@ -11,6 +11,7 @@
 
 #include "arguments.h"
 #include "arrays.h"
+#include "base/output_file.h"
 #include "bindings.h"
 #include "errors.h"
 #include "handlers.h"
@@ -91,6 +92,7 @@ std::vector<Rows8> trajectories(PythonSystem& system, const std::string& frame) 
 
 void save_trajectory(PythonSystem& system, const Path& path, const std::string& frame) {
   const RigFrame chosen = frame_named(frame);
+  check(check_output_file(path.string(), "", true, "# bslam trajectory"));
   check(write_tum(path, value_of((*system).trajectory(chosen)), chosen));
 }
 
@@ -244,7 +246,8 @@ void bind_system(nb::module_& module) {
       .def("trajectories", trajectories, nb::arg("frame") = "cam0",
            "Returns trajectory() of all submaps; the submap with the most frames is first.")
       .def("save_trajectory", save_trajectory, nb::arg("path"), nb::arg("frame") = "cam0",
-           "Writes trajectory() as TUM file, with times that are exact to the nanosecond.");
+           "Writes trajectory() as TUM file, with times that are exact to the nanosecond. It replaces an earlier\n"
+           "trajectory of bslam, and no other file.");
 }
 
 }  // namespace bslam::python

@@ -21,6 +21,16 @@ def test_trajectory_equals_that_of_bslam_run_byte_for_byte(finished, program_run
     np.testing.assert_allclose(finished[0].trajectory(), np.loadtxt(tmp_path / "t.tum"), atol=1e-9, rtol=0)
 
 
+def test_a_saved_trajectory_replaces_an_earlier_one_and_no_other_file(finished, tmp_path):
+    rig = tmp_path / "rig.yaml"
+    rig.write_text("precious")
+    with pytest.raises(bslam.Error, match=r"rig.yaml: found an existing file of another kind, expected a new name"):
+        finished[0].save_trajectory(rig)
+    assert rig.read_text() == "precious"
+    for _ in range(2):
+        finished[0].save_trajectory(tmp_path / "t.tum")
+
+
 def test_settings_and_seed_give_the_result_of_bslam_run(recording, program, tmp_path):
     system, _ = recording.run(settings={"features.per_image": 300, "tracking.frontend": "features"}, seed=3)
     system.save_trajectory(tmp_path / "t.tum")

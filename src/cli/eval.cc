@@ -58,11 +58,40 @@ Status check_plot(const EvalArguments& a) {
                                  {a.estimate, a.ground_truth, a.rig.value_or(""), a.times.value_or("")});
 }
 
-// Returns T_cam_frame of the frame of the ground truth and of the camera of the estimate; nullopt if both paths are in
-// one frame.
+// The frame of the poses of the estimate; empty if it is not known.
+std::string frame_of_estimate(const EvalArguments& arguments) {
+  const auto comments = evaluation::read_comments(arguments.estimate);
+  return arguments.camera ? comments.frame : comments.frame_of_poses();
+}
+
+// Whether the ground truth is an EuRoC csv with poses of the body, as that of EuRoC itself.
+bool is_euroc_truth(const EvalArguments& arguments) {
+  const auto comments = evaluation::read_comments(arguments.ground_truth);
+  return comments.euroc_csv && comments.frame_of_poses() == "body";
+}
+
+// What is not known from the files about the frames of their poses.
+void note_of_frames(const EvalArguments& arguments) {
+  const bool of_body = frame_of_estimate(arguments) == "body";
+  if (of_body && evaluation::read_comments(arguments.estimate).frame.empty()) {
+    print_message(
+        "note: the poses of {}, which is an EuRoC csv, are taken to be those of the body; --rig FILE --camera N says "
+        "that they are those of a camera\n",
+        arguments.estimate);
+  }
+  if (!of_body && arguments.gt_frame == "cam0" && is_euroc_truth(arguments)) {
+    print_message(
+        "note: EuRoC ground truth contains poses of the body; use --gt-frame body --rig FILE to compare it with "
+        "a camera\n");
+  }
+}
+
+// Returns T_cam_frame of the frame of the ground truth and of the camera, or body, of the estimate; nullopt if both
+// paths are in one frame.
 Result<std::optional<geometry::SE3>> frame_of_truth(const EvalArguments& arguments) {
-  const std::string frame = evaluation::read_comments(arguments.estimate).frame;
-  if (frame == "body" && arguments.gt_frame == "body") return std::optional<geometry::SE3>();
+  const std::string frame = frame_of_estimate(arguments);
+  if (frame == "body" && (arguments.gt_frame == "body" || is_euroc_truth(arguments)))
+    return std::optional<geometry::SE3>();
   if (arguments.gt_frame != "body" && !arguments.rig) {
     if (!frame.empty() && frame != "cam0") {
       print_message(
@@ -80,6 +109,7 @@ Result<std::optional<geometry::SE3>> frame_of_truth(const EvalArguments& argumen
   }
   const auto rig = rig_formats::read_rig(*arguments.rig);
   if (!rig) return rig.error();
+  if (frame == "body" && !arguments.camera) return std::optional(rig->body_from_first(0));
   const auto camera = camera_of_trajectory(arguments.estimate, *rig, *arguments.rig, arguments.camera);
   if (!camera) return camera.error();
   if (arguments.gt_frame == "body") note_of_body(*rig, *arguments.rig);
@@ -162,11 +192,7 @@ Result<TrajectoryEvaluation> evaluate_files(const EvalArguments& arguments) {
   auto ground_truth = evaluation::read_trajectory(arguments.ground_truth, arguments.times);
   if (!ground_truth) return ground_truth.error();
   note_of_order(arguments);
-  if (arguments.gt_frame == "cam0" && std::filesystem::path(arguments.ground_truth).extension() == ".csv") {
-    print_message(
-        "note: EuRoC ground truth contains poses of the body; use --gt-frame body --rig FILE to compare it with "
-        "a camera\n");
-  }
+  note_of_frames(arguments);
   if (const std::string scale = evaluation::read_comments(arguments.estimate).scale;
       scale != "metric" && arguments.align != "sim3") {
     print_message("note: the scale of {} is {}, so that its errors are mainly those of the scale; use --align sim3\n",

@@ -38,11 +38,13 @@ struct TrajectoryArguments {
 
 // The frame of the poses in the file. If it does not name one, or cam0, --camera decides.
 std::string frame_in_file(const TrajectoryArguments& arguments) {
-  const std::string frame = evaluation::read_comments(arguments.file).frame;
+  const auto input = evaluation::read_comments(arguments.file);
+  const std::string frame = arguments.camera ? input.frame : input.frame_of_poses();
   return frame.empty() || frame == "cam0" ? "cam" + std::to_string(arguments.camera.value_or(0)) : frame;
 }
 
-// The calibration, and the camera whose poses the trajectory contains.
+// The calibration, and the camera whose poses the trajectory contains. Poses of the body are converted to camera 0
+// first.
 struct TrajectoryRig {
   camera::Rig rig;
   std::size_t camera = 0;
@@ -52,6 +54,7 @@ Result<TrajectoryRig> rig_of_trajectory(const TrajectoryArguments& arguments, co
   if (!arguments.rig) return Error{"command line", needed_by, "no --rig", "--rig FILE, the calibration of the run"};
   auto rig = rig_formats::read_rig(*arguments.rig);
   if (!rig) return rig.error();
+  if (frame_in_file(arguments) == "body") return TrajectoryRig{*std::move(rig), 0};
   const auto camera = camera_of_trajectory(arguments.file, *rig, *arguments.rig, arguments.camera);
   if (!camera) return camera.error();
   return TrajectoryRig{*std::move(rig), *camera};
@@ -124,36 +127,51 @@ Status convert_stamps(const TrajectoryArguments& arguments, Trajectory& trajecto
   return {};
 }
 
-// T_cam_frame of the requested frame and of the camera of the trajectory.
-Result<SE3> wanted_frame(const TrajectoryArguments& arguments) {
-  const std::string& frame = arguments.frame;
-  if (frame.empty() || (!arguments.camera && frame == frame_in_file(arguments))) return SE3();
+// Whose poses are written: by default those of the input.
+std::string frame_of_output(const TrajectoryArguments& arguments) {
+  return arguments.frame.empty() ? frame_in_file(arguments) : arguments.frame;
+}
+
+// T_file_cam of the poses in the file: the pose of camera 0 on the body if they are those of the body.
+Result<SE3> camera_in_file(const TrajectoryArguments& arguments) {
+  if (frame_in_file(arguments) != "body") return SE3();
+  const auto source = rig_of_trajectory(arguments, "poses of the body");
+  if (!source) return source.error();
+  return source->rig.body_from_first(source->camera);
+}
+
+// T_cam_frame of the requested frame and of the camera of the trajectory. `T_file_cam`: see camera_in_file.
+Result<SE3> wanted_frame(const TrajectoryArguments& arguments, const SE3& T_file_cam) {
+  const std::string frame = frame_of_output(arguments), own = frame_in_file(arguments);
+  if (own == "body" && frame == own) return T_file_cam.inverse();
+  if (arguments.frame.empty() || (!arguments.camera && frame == own)) return SE3();
   const auto T_cam_frame = frame_in_camera(frame, arguments);
-  const double distance_m = T_cam_frame ? T_cam_frame->translation().norm() : 0;
+  const double distance_m = T_cam_frame ? (T_file_cam * *T_cam_frame).translation().norm() : 0;
   if (distance_m > 0 && evaluation::read_comments(arguments.file).scale != "metric") {
     print_message(
-        "note: the camera is {:.3f} m away from {}, but the unit of {} is not the metre: the distance is added to "
-        "the path as it is\n",
-        distance_m, frame, arguments.file);
+        "note: the {} is {:.3f} m away from {}, but the unit of {} is not the metre: the distance is added to the path "
+        "as it is\n",
+        own == "body" ? "body" : "camera", distance_m, frame, arguments.file);
   }
   return T_cam_frame;
 }
 
-// The input is a trajectory of a camera.
 Result<Trajectory> converted(const TrajectoryArguments& arguments) {
-  auto read = evaluation::read_trajectory(arguments.file, arguments.times);
-  if (!read) return read;
-  Trajectory trajectory = *std::move(read);
+  const auto read = evaluation::read_trajectory(arguments.file, arguments.times);
+  if (!read) return read.error();
+  const auto T_file_cam = camera_in_file(arguments);
+  if (!T_file_cam) return T_file_cam.error();
+  Trajectory trajectory = evaluation::moved_to_frame(*read, *T_file_cam);
   SE3 T_upright_world;
   if (arguments.axes == "ros") {
     const auto axes = upright_axes_of(trajectory, arguments);
     if (!axes) return axes.error();
     T_upright_world = *axes;
   }
-  const auto frame = wanted_frame(arguments);
+  const auto frame = wanted_frame(arguments, *T_file_cam);
   if (!frame) return frame.error();
   SE3 T_cam_frame = *frame;
-  if (arguments.axes == "ros" && arguments.frame != "body") {
+  if (arguments.axes == "ros" && frame_of_output(arguments) != "body") {
     geometry::Matrix3d R_cam_ros;  // x forward, y left, z up in a camera's x right, y down, z forward
     R_cam_ros << 0, -1, 0, 0, 0, -1, 1, 0, 0;
     T_cam_frame = T_cam_frame * SE3(R_cam_ros, geometry::Vector3d::Zero());
@@ -193,18 +211,27 @@ Status check_out(const TrajectoryArguments& a) {
   return check_new_file(a.out, a.overwrite);
 }
 
+// Poses of the body are converted by the rig; those with other axes are not.
+Status check_frame(const TrajectoryArguments& arguments) {
+  const std::string frame = frame_in_file(arguments);
+  if (frame.ends_with("_ros"))
+    return Error{arguments.file, "frame", frame, "a trajectory of a camera, as bslam run writes it"};
+  if (frame == "body" && (!arguments.rig || arguments.camera))
+    return Error{arguments.file, "frame", frame,
+                 "a trajectory of a camera, as bslam run writes it, or --rig FILE without --camera"};
+  return {};
+}
+
 int run_export(const TrajectoryArguments& arguments) {
   if (const Status s = check_out(arguments); !s) return report_error(s.error());
-  const std::string own_frame = frame_in_file(arguments);
-  if (own_frame == "body" || own_frame.ends_with("_ros"))
-    return report_error({arguments.file, "frame", own_frame, "a trajectory of a camera, as bslam run writes it"});
+  if (const Status s = check_frame(arguments); !s) return report_error(s.error());
   if (!arguments.up.empty() && arguments.axes != "ros")
     return report_error({"command line", "--up", "no --axes ros", "--axes ros"});
   const auto trajectory = converted(arguments);
   if (!trajectory) return report_error(trajectory.error());
   using enum evaluation::TrajectoryFormat;
   const auto format = arguments.format == "euroc" ? kEurocCsv : arguments.format == "kitti" ? kKitti : kTum;
-  const std::string header = comments(arguments, arguments.frame.empty() ? own_frame : arguments.frame);
+  const std::string header = comments(arguments, frame_of_output(arguments));
   const Status status = evaluation::write_trajectory(arguments.out, *trajectory, format, header, arguments.overwrite);
   if (!status) return report_error(status.error());
   std::printf("%s: %zu pose%s\n", arguments.out.c_str(), trajectory->size(), trajectory->size() == 1 ? "" : "s");
@@ -216,7 +243,9 @@ int run_export(const TrajectoryArguments& arguments) {
 void add_export(CLI::App& app, int& exit_status) {
   const auto arguments = std::make_shared<TrajectoryArguments>();
   CLI::App* verb = app.add_subcommand("export", "convert a trajectory to another format, frame or axes");
-  verb->add_option("TRAJECTORY", arguments->file, "a trajectory of a camera: TUM, EuRoC csv or KITTI")->required();
+  verb->add_option("TRAJECTORY", arguments->file,
+                   "poses of a camera, or with --rig of the body: TUM, EuRoC csv or KITTI")
+      ->required();
   verb->add_option("--out", arguments->out, "file to write")->required();
   verb->add_option("--format", arguments->format, "format of the file; default: tum")
       ->check(CLI::IsMember({"tum", "euroc", "kitti"}));

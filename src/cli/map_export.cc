@@ -113,7 +113,9 @@ void add_map_export(CLI::App& map, int& exit_status) {
                   "calibration of the recording, as for bslam run; default: that in it, or else that of the map");
   out->add_flag("--undistort", request.undistort,
                 "colmap, nerfstudio: write undistorted images of the keyframes, with pinhole cameras");
-  out->add_option("--submap", request.submap, "number of the submap to export; default: the one with most landmarks");
+  out->add_option("--submap", request.submap,
+                  "number of the submap to export, as in bslam map info; default: the one with most landmarks")
+      ->check(CLI::NonNegativeNumber);
   out->add_option("--resolution", request.resolution, "octomap, nav2: side of a cell in metres")
       ->check(CLI::Range(1e-4, 1e4));
   out->add_option("--max-range", request.max_range, "octomap, nav2: length of rays in metres")

@@ -31,8 +31,8 @@ int map_transfer(const TransferArguments& arguments) {
   const auto input = evaluation::read_comments(arguments.trajectory);
   const auto moved = session::transfer_trajectory(*trajectory, *own, *merged, input);
   if (!moved) return report_error(moved.error());
-  const std::string parent = moved->submap == 0 ? "world" : fmt::format("world_of_submap_{}", moved->submap + 1);
-  std::string comments = evaluation::trajectory_header(input.frame.empty() ? "cam0" : input.frame, input.state, parent);
+  const std::string parent = evaluation::world_of_submap(moved->submap), frame = input.frame_of_poses();
+  std::string comments = evaluation::trajectory_header(frame.empty() ? "cam0" : frame, input.state, parent);
   if (input.scale != "metric") comments += "\n# " + evaluation::scale_comment(input.scale);
   if (input.image_stamps) comments += "\n# " + evaluation::image_stamp_comment();
   const Status s =

@@ -12,7 +12,8 @@ namespace bslam::cli {
 
 Result<std::size_t> camera_of_trajectory(const std::filesystem::path& trajectory, const camera::Rig& rig,
                                          const std::filesystem::path& rig_file, std::optional<int> option) {
-  const std::string frame = evaluation::read_comments(trajectory).frame;
+  const auto comments = evaluation::read_comments(trajectory);
+  const std::string frame = option ? comments.frame : comments.frame_of_poses();
   const auto named = camera::camera_of_frame(frame, rig);
   if (!option) {
     if (named) return *named;

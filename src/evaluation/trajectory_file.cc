@@ -330,8 +330,14 @@ std::string tum_text(const Trajectory& trajectory, std::string_view header) {
   return text;
 }
 
-std::string euroc_csv_text(const Trajectory& trajectory) {
-  std::string text = "#timestamp [ns],p_x [m],p_y [m],p_z [m],q_w [],q_x [],q_y [],q_z []\n";
+std::string euroc_csv_text(const Trajectory& trajectory, std::string_view header) {
+  std::string text = "#timestamp [ns],p_x [m],p_y [m],p_z [m],q_w [],q_x [],q_y [],q_z []";
+  if (!header.empty()) text += " # ";
+  for (const char c : header) {  // without further columns
+    if (c == '\n') text += ' ';
+    if (c != '\n' && c != ',') text += c;
+  }
+  text += '\n';
   for (const TimedPose& pose : trajectory) {
     const Vector3d& p = pose.T_world_frame.translation();
     const Quaterniond& q = pose.T_world_frame.rotation();
@@ -364,7 +370,7 @@ Status write_trajectory(const std::filesystem::path& file, const Trajectory& tra
     case TrajectoryFormat::kTum:
       return write_atomically(file, tum_text(trajectory, header));
     case TrajectoryFormat::kEurocCsv:
-      return write_atomically(file, euroc_csv_text(trajectory));
+      return write_atomically(file, euroc_csv_text(trajectory, header));
     case TrajectoryFormat::kKitti:
       break;
   }

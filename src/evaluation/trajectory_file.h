@@ -35,17 +35,18 @@ std::optional<std::filesystem::path> times_of_poses(const std::filesystem::path&
 // rounded half away from zero. Returns nullopt if the text is not a number or is beyond +-4e9 s.
 std::optional<TimeNs> parse_seconds(std::string_view text);
 
-// Returns the content of a trajectory file. TUM begins with "# HEADER" if `header` is not empty. Seconds, metres and
-// quaternions have nine decimals. KITTI contains poses only; `times_text` gives the matching times file.
+// Returns the content of a trajectory file. TUM begins with "# HEADER" if `header` is not empty. In an EuRoC csv its
+// lines follow the title in the first line, since many programs skip just one line. Seconds, metres and quaternions
+// have nine decimals. KITTI contains poses only; `times_text` gives the matching times file.
 std::string tum_text(const Trajectory& trajectory, std::string_view header);
-std::string euroc_csv_text(const Trajectory& trajectory);
+std::string euroc_csv_text(const Trajectory& trajectory, std::string_view header = {});
 std::string kitti_text(const Trajectory& trajectory);
 std::string times_text(const Trajectory& trajectory);
 
 // The path of the times file that write_trajectory writes for KITTI poses: times.txt in the same folder.
 std::filesystem::path times_beside(const std::filesystem::path& poses);
 
-// Writes a trajectory atomically. KITTI then also writes times.txt into the same folder. `header` is used by TUM only.
+// Writes a trajectory atomically. KITTI then also writes times.txt into the same folder. KITTI ignores `header`.
 // Errors: a file cannot be written; times.txt exists, which may be that of a recording, unless `replace_times`;
 // times.txt is the name of the poses themselves. In the last two cases nothing is written.
 Status write_trajectory(const std::filesystem::path& file, const Trajectory& trajectory, TrajectoryFormat format,

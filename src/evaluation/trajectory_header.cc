@@ -29,23 +29,36 @@ void add_comment(std::string_view line, TrajectoryComments& out) {
   if (line.starts_with(kImageStamps)) out.image_stamps = true;
 }
 
+// Adds the comments in one line that begins with #. The title of a csv may be followed by several.
+void add_comments(std::string_view line, TrajectoryComments& out) {
+  constexpr std::string_view kComment = "# ";
+  const std::size_t first = line.starts_with(kComment) ? 0 : line.find(kComment);
+  if (first == 0) return add_comment(line.substr(kComment.size()), out);
+  for (std::size_t at = first; at != std::string_view::npos; at = line.find(kComment, at + 1))
+    add_comment(line.substr(at + kComment.size()), out);
+}
+
 }  // namespace
 
 std::string scale_comment(std::string_view scale) { return fmt::format("scale={}: lengths are not in metres", scale); }
 
 std::string image_stamp_comment() { return fmt::format("{}, without the time offset of camera 0", kImageStamps); }
 
+std::string world_of_submap(std::size_t number) {
+  return number == 0 ? "world" : fmt::format("world_of_submap_{}", number);
+}
+
 TrajectoryComments read_comments(const std::filesystem::path& file) {
   constexpr int kMaxLines = 100;
-  constexpr std::string_view kComment = "# ";
   TrajectoryComments out;
   const auto bytes = read_text(file, kMaxTrajectoryBytes);
   std::string_view text = bytes ? *bytes : std::string_view();
   for (int n = 0; n < kMaxLines && text.starts_with('#'); ++n) {
     const std::string_view line = text.substr(0, text.find('\n'));
-    if (line.starts_with(kComment)) add_comment(line.substr(kComment.size()), out);
+    add_comments(line, out);
     text.remove_prefix(std::min(line.size() + 1, text.size()));
   }
+  out.euroc_csv = text.substr(0, text.find('\n')).find(',') != std::string_view::npos;
   return out;
 }
 

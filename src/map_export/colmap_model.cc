@@ -73,7 +73,7 @@ class Writer {
     write_frames();
     write_images();
     for (std::size_t i = 0; i < selection_.landmarks.size(); ++i) write_point(i);
-    model_.mean_error_px = points_ > 0 ? error_sum_ / static_cast<double>(points_) : 0.0;
+    model_.mean_error_px = model_.landmarks > 0 ? error_sum_ / static_cast<double>(model_.landmarks) : 0.0;
     return std::move(model_);
   }
 
@@ -168,7 +168,7 @@ class Writer {
     if (track.empty()) return;
     if (seen > 0) error_px /= static_cast<double>(seen);
     error_sum_ += error_px;
-    ++points_;
+    ++model_.landmarks;
     const Colour& colour = colours_.of[i];
     fmt::format_to(std::back_inserter(model_.points), "{} {} {} {} {} {} {} {}{}\n", l.value() + 1, p.x(), p.y(), p.z(),
                    colour[0], colour[1], colour[2], error_px, track);
@@ -184,7 +184,6 @@ class Writer {
   ColmapModel model_;
   std::vector<std::vector<int>> place_;  // per image and keypoint; -1: not in the model
   double error_sum_ = 0;
-  std::size_t points_ = 0;
 };
 
 // Notes on differences between the model and the map.

@@ -14,6 +14,7 @@ namespace bslam::map_export {
 
 struct ColmapModel {
   std::string rigs, frames, cameras, images, points;  // rigs.txt, frames.txt, cameras.txt, images.txt, points3D.txt
+  std::size_t landmarks = 0;                          // number of points: landmarks that an image of the model shows
   double mean_error_px = 0;        // mean over the points of their mean reprojection errors, as by COLMAP
   std::vector<std::string> notes;  // what COLMAP cannot hold
 };

@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-Status write_colmap(const ColmapModel& model, const AtomicFolder& folder) {
+Status write_files(const ColmapModel& model, const AtomicFolder& folder) {
   const std::pair<const char*, const std::string*> files[] = {{"rigs.txt", &model.rigs},
                                                               {"frames.txt", &model.frames},
                                                               {"cameras.txt", &model.cameras},
@@ -28,18 +28,18 @@ Status write_colmap(const ColmapModel& model, const AtomicFolder& folder) {
   return {};
 }
 
-std::string counts(const Exporter& exporter) {
-  return fmt::format("{} keyframes, {} landmarks", exporter.selection.keyframes.size(),
-                     exporter.selection.landmarks.size());
+std::string counts(std::size_t keyframes, std::size_t landmarks) {
+  return fmt::format("{} keyframes, {} landmarks", keyframes, landmarks);
 }
 
 Status write_keyframes(Exporter& exporter, const AtomicFolder& folder) {
-  const std::string header = evaluation::trajectory_header("cam0", evaluation::PoseState::kFinal);
   const std::vector<storage::Submap> submaps = storage::submaps_of(exporter.map());
   for (std::size_t i = 0; i < submaps.size(); ++i) {
     const std::string name = submaps.size() == 1 ? "keyframes.tum" : fmt::format("keyframes_{}.tum", i);
     const auto trajectory = storage::keyframe_trajectory(exporter.map(), submaps[i]);
     exporter.note_equal_times(submaps[i].keyframes.size(), trajectory.size(), name);
+    const std::string header =
+        evaluation::trajectory_header("cam0", evaluation::PoseState::kFinal, evaluation::world_of_submap(i));
     if (Status s = folder.write(name, evaluation::tum_text(trajectory, header)); !s) return s;
   }
   return {};
@@ -89,8 +89,13 @@ Result<AtomicFolder> folder_of(const Exporter& exporter) {
   return AtomicFolder::create(exporter.request.out, exporter.request.overwrite);
 }
 
-void note_all(const std::vector<std::string>& notes, Exporter& exporter) {
-  for (const std::string& note : notes) exporter.note(note);
+Status write_colmap(const ColmapModel& model, Exporter& exporter, const AtomicFolder& folder) {
+  for (const std::string& note : model.notes) exporter.note(note);
+  const std::size_t all = exporter.selection.landmarks.size();
+  if (model.landmarks < all)
+    exporter.note(fmt::format("{} of {} landmarks are not in points3D.txt, because no image of the model shows them",
+                              all - model.landmarks, all));
+  return write_files(model, folder);
 }
 
 }  // namespace
@@ -128,10 +133,10 @@ Status export_colmap(Exporter& exporter) {
     if (Status s = write_undistorted(exporter, *folder); !s) return s;
   const auto model = colmap_model(exporter.selection, exporter.images, exporter.cameras, colours);
   if (!model) return model.error();
-  if (Status s = write_colmap(*model, *folder); !s) return s;
-  note_all(model->notes, exporter);
-  exporter.report.summary = fmt::format("{} images, {}, mean reprojection error {:.2f} px",
-                                        exporter.images.images().size(), counts(exporter), model->mean_error_px);
+  if (Status s = write_colmap(*model, exporter, *folder); !s) return s;
+  exporter.report.summary =
+      fmt::format("{} images, {}, mean reprojection error {:.2f} px", exporter.images.images().size(),
+                  counts(exporter.selection.keyframes.size(), model->landmarks), model->mean_error_px);
   return folder->commit();
 }
 
@@ -152,7 +157,9 @@ Status export_nerfstudio(Exporter& exporter) {
   if (Status s = folder->write("transforms.json", *json); !s) return s;
   if (Status s = folder->write("points.ply", ply); !s) return s;
   exporter.note_upward();
-  exporter.report.summary = fmt::format("{} images, {}", exporter.images.images().size(), counts(exporter));
+  exporter.report.summary =
+      fmt::format("{} images, {}", exporter.images.images().size(),
+                  counts(exporter.selection.keyframes.size(), exporter.selection.landmarks.size()));
   return folder->commit();
 }
 
@@ -165,13 +172,11 @@ Status export_folder(Exporter& exporter) {
   if (Status s = write_keyframes(exporter, *folder); !s) return s;
   const auto model = colmap_model(exporter.selection, exporter.images, exporter.cameras, colours);
   if (model) {
-    if (Status s = write_colmap(*model, *folder); !s) return s;
-    note_all(model->notes, exporter);
+    if (Status s = write_colmap(*model, exporter, *folder); !s) return s;
   } else {  // the other files are still useful
     exporter.note("no COLMAP model was written: " + model.error().message());
   }
-  exporter.report.summary =
-      fmt::format("{} keyframes, {} landmarks", exporter.map().num_keyframes(), exporter.map().num_landmarks());
+  exporter.report.summary = counts(exporter.map().num_keyframes(), exporter.selection.landmarks.size());
   return folder->commit();
 }
 

@@ -107,6 +107,8 @@ class MapService::Implementation final : public web_server::RequestHandler {
     return std::nullopt;
   }
 
+  Response refusal(int status, std::string_view sentence) override { return error_response(status, sentence); }
+
   void handle(const RequestHead& head, std::string body, Respond respond) override {
     const std::string_view path = web_server::path_of(head.target);
     if (path == kHealth) return respond({200, "ok\n"});

@@ -281,15 +281,19 @@ namespace {
 
 using Files = std::vector<std::pair<std::string, std::string>>;  // name and content
 
+std::vector<KeyframeId> roots_of(const SessionResult& result) {
+  return result.map ? result.map->roots() : std::vector<KeyframeId>();
+}
+
 // Adds one file per submap. The file of the first submap is written even if there is no submap.
-void add_trajectories(const RunRecord& record, const std::vector<system::SubmapTrajectory>& submaps,
-                      const std::string& stem, evaluation::PoseState state, std::optional<TimeNs> subtracted_ns,
-                      Files& files) {
+void add_trajectories(const SessionResult& result, const std::vector<system::SubmapTrajectory>& submaps,
+                      const std::string& stem, evaluation::PoseState state, Files& files) {
+  const std::vector<KeyframeId> roots = roots_of(result);
   for (std::size_t i = 0; i < std::max<std::size_t>(submaps.size(), 1); ++i) {
     evaluation::Trajectory poses = submaps.empty() ? evaluation::Trajectory() : submaps[i].poses;
-    std::string comments = trajectory_comments(record, submaps, i, state);
-    if (subtracted_ns) {
-      for (evaluation::TimedPose& pose : poses) pose.time_ns -= *subtracted_ns;
+    std::string comments = trajectory_comments(result.record, submaps, i, state, roots);
+    if (result.subtracted_ns) {
+      for (evaluation::TimedPose& pose : poses) pose.time_ns -= *result.subtracted_ns;
       comments += "\n# " + evaluation::image_stamp_comment();
     }
     files.emplace_back(trajectory_file(stem, i), evaluation::tum_text(poses, comments));
@@ -312,8 +316,10 @@ std::vector<Eigen::Vector3d> landmarks_of_path(const SessionResult& result) {
 std::string submap_text(const SessionResult& result) {
   const std::size_t n = result.trajectories.size();
   if (n < 2) return {};
-  return fmt::format("submap 1 of {}, {} poses; the others, each in its own world frame, are in {}{}", n,
-                     result.trajectories.front().poses.size(), trajectory_file("trajectory", 1),
+  const system::SubmapTrajectory& shown = result.trajectories.front();
+  return fmt::format("submap {}, one of {}, {} poses; the others, each in its own world frame, are in {}{}",
+                     submap_number(shown.root, roots_of(result)).value_or(0), n, shown.poses.size(),
+                     trajectory_file("trajectory", 1),
                      n > 2 ? fmt::format(" to {}", trajectory_file("trajectory", n - 1)) : "");
 }
 
@@ -323,10 +329,8 @@ Files output_files(const SessionResult& result, const system::Config& config) {
   const OptionTable table(copy);
   Files files;
   files.emplace_back("summary.json", summary_text(result.record));
-  add_trajectories(result.record, result.trajectories, "trajectory", evaluation::PoseState::kFinal,
-                   result.subtracted_ns, files);
-  add_trajectories(result.record, result.live, "trajectory_live", evaluation::PoseState::kLive, result.subtracted_ns,
-                   files);
+  add_trajectories(result, result.trajectories, "trajectory", evaluation::PoseState::kFinal, files);
+  add_trajectories(result, result.live, "trajectory_live", evaluation::PoseState::kLive, files);
   files.emplace_back("covariance_live.csv", covariance_text(result.record, result.subtracted_ns.value_or(0)));
   files.emplace_back("config.yaml", yaml::config_to_yaml(table));
   if (result.refined_rig)

@@ -36,12 +36,13 @@ RequestHead head_of(const Request& request) {
 }
 
 // The answer to an invalid request.
-Response response_to(ErrorCode error, std::uint64_t max_body) {
+Response response_to(ErrorCode error, std::uint64_t max_body, RequestHandler& handler) {
   if (error == http::error::body_limit)
-    return {413, "The request is too long: at most " + std::to_string(max_body) + " bytes are accepted.\n"};
+    return handler.refusal(413,
+                           "The request is too long: at most " + std::to_string(max_body) + " bytes are accepted.");
   if (error == http::error::header_limit || error == http::error::buffer_overflow)
-    return {431, "The header of the request is too long.\n"};
-  return {400, "This is not a request that this server understands.\n"};
+    return handler.refusal(431, "The header of the request is too long.");
+  return handler.refusal(400, "This is not a request that this server understands.");
 }
 
 }  // namespace
@@ -77,11 +78,11 @@ class Connection : public std::enable_shared_from_this<Connection> {
       stream_.expires_never();
       return all_.upgrade_(parser_.release(), stream_.release_socket(), std::move(slot_));
     }
-    if (parser_.chunked()) return respond({411, "The request must state the length of its body.\n"});
+    if (parser_.chunked()) return refuse(411, "The request must state the length of its body.");
     const std::uint64_t length = parser_.content_length().value_or(0);
-    if (length > 0 && head.method != "POST") return respond({400, "Only a POST request may have a body.\n"});
+    if (length > 0 && head.method != "POST") return refuse(400, "Only a POST request may have a body.");
     if (length > all_.limits_.all_bodies_bytes - all_.body_bytes_)
-      return respond({503, "Too many requests at once.\n", Response().type, {{"Retry-After", "1"}}});
+      return refuse(503, "Too many requests at once.", {{"Retry-After", "1"}});
     reserved_ = length;
     all_.body_bytes_ += length;
     if (beast::iequals(parser_.get()[http::field::expect], "100-continue")) return invite_body();
@@ -120,7 +121,13 @@ class Connection : public std::enable_shared_from_this<Connection> {
     if (error == beast::error::timeout) return all_.handler_.answered(head, 408);
     const bool of_http = error.category() == http::make_error_code(http::error::bad_method).category();
     if (of_http && error != http::error::end_of_stream && error != http::error::partial_message)
-      respond(response_to(error, all_.limits_.body_bytes));
+      respond(response_to(error, all_.limits_.body_bytes, all_.handler_));
+  }
+
+  void refuse(int status, std::string_view sentence, std::vector<std::pair<std::string, std::string>> headers = {}) {
+    Response response = all_.handler_.refusal(status, sentence);
+    response.headers = std::move(headers);
+    respond(std::move(response));
   }
 
   void respond(Response response) {

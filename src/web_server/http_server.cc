@@ -10,6 +10,9 @@
 
 namespace bslam::web_server {
 
+Response RequestHandler::refusal(int status, std::string_view sentence) {
+  return {status, std::string(sentence) + "\n"};
+}
 void RequestHandler::answered(const RequestHead&, int) {}
 
 bool is_loopback(const std::string& address) {

@@ -52,6 +52,8 @@ class RequestHandler {
 
   // The answer to a request that is refused before its body is read; nullopt: it is accepted.
   virtual std::optional<Response> refuse(const RequestHead& head) = 0;
+  // The answer to a request that the server itself refuses, with a sentence that says why. By default it is plain text.
+  virtual Response refusal(int status, std::string_view sentence);
   // An accepted request with its whole body.
   virtual void handle(const RequestHead& head, std::string body, Respond respond) = 0;
   // Called for every request when its answer is known. This includes requests with an HTTP error (then the head may be

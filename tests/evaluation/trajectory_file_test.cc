@@ -132,6 +132,34 @@ TEST_F(TrajectoryFile, WritesTumWithHeaderAndNineDecimals) {
   EXPECT_EQ(trajectory_header("body", PoseState::kLive), "bslam trajectory frame=body parent=world final=false");
 }
 
+// Programs for EuRoC files skip lines that begin with #, or just the first line.
+TEST_F(TrajectoryFile, AnEurocCsvHasItsCommentsInTheTitle) {
+  const std::string header = trajectory_header("body", PoseState::kLive, "map") + "\n# " +
+                             scale_comment("up-to-scale") + "\n# " + image_stamp_comment();
+  const Trajectory trajectory = random_trajectory();
+  const std::string text = euroc_csv_text(trajectory, header), title = text.substr(0, text.find('\n'));
+  EXPECT_EQ(std::ranges::count(text, '#'), 4);
+  EXPECT_EQ(std::ranges::count(title, ','), 7);
+  EXPECT_EQ(text.find("#timestamp [ns],p_x [m],"), 0u);
+  const TrajectoryComments comments = read_comments(write("t.csv", text));
+  EXPECT_EQ(comments.frame_of_poses(), "body");
+  EXPECT_EQ(comments.parent, "map");
+  EXPECT_EQ(comments.state, PoseState::kLive);
+  EXPECT_EQ(comments.scale, "up-to-scale");
+  EXPECT_TRUE(comments.image_stamps);
+  const std::string camera = euroc_csv_text(trajectory, trajectory_header("cam0", PoseState::kFinal));
+  EXPECT_EQ(read_comments(write("t.csv", camera)).frame_of_poses(), "cam0");
+}
+
+TEST_F(TrajectoryFile, ThePosesOfAnEurocCsvAreOfTheBodyUnlessItSaysOtherwise) {
+  for (const std::string title : {"#timestamp, p_RS_R_x [m], p_RS_R_y [m]\r\n", "timestamp,p_x\n", ""}) {
+    const TrajectoryComments comments = read_comments(write("t.csv", title + "1,1,2,3,1,0,0,0,0.1\n"));
+    EXPECT_EQ(comments.frame, "") << title;
+    EXPECT_EQ(comments.frame_of_poses(), "body") << title;
+  }
+  EXPECT_EQ(read_comments(write("t", "# a, b\n1.5 1 2 3 0 0 0 1\n")).frame_of_poses(), "");
+}
+
 TEST_F(TrajectoryFile, CommentsAreReadAsTheyAreWritten) {
   const std::string header = "# " + trajectory_header("left", PoseState::kLive, "world_of_submap_2") + "\n# " +
                              scale_comment("up-to-scale") + "\n# " + image_stamp_comment() + "\n";

@@ -237,7 +237,9 @@ class Serve(unittest.TestCase):
                 self.assertIn(expected, json.loads(answer)['error'])
         self.assertEqual(server.ask('POST', '/v1/localise', form(images[:1]), kind='image/png')[0], 400)
         head = b'POST /v1/localise HTTP/1.1\r\nHost: 127.0.0.1\r\n'
-        self.assertEqual(server.ask('POST', '/v1/localise', bytes(3 << 20))[0], 413)
+        status, headers, answer = server.ask('POST', '/v1/localise', bytes(3 << 20))
+        self.assertEqual((status, headers['Content-Type']), (413, 'application/json'))
+        self.assertIn('at most 2097152 bytes', json.loads(answer)['error'])
         self.assertEqual(server.raw(head + b'Content-Length: 99999999999999999\r\n\r\nx'), 413)
         self.assertEqual(server.raw(head + b'Content-Length: -1\r\n\r\nx'), 400)
         self.assertEqual(server.raw(head + b'Transfer-Encoding: chunked\r\n\r\n1\r\nx\r\n0\r\n\r\n'), 411)

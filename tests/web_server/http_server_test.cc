@@ -88,9 +88,9 @@ class Recorder final : public RequestHandler {
   int late_ = 0;
 };
 
-std::unique_ptr<HttpServer> start(Recorder& recorder) {
+std::unique_ptr<HttpServer> start(RequestHandler& handler) {
   const HttpLimits limits{.body_bytes = 100, .all_bodies_bytes = 150, .request_time = std::chrono::seconds(1)};
-  return *HttpServer::start({}, limits, recorder);
+  return *HttpServer::start({}, limits, handler);
 }
 
 bool begins(const std::string& answer, const std::string& status) { return answer.starts_with("HTTP/1.1 " + status); }
@@ -191,6 +191,37 @@ TEST(HttpServer, BodiesAreLimitedEachAndTogether) {
   fourth.post(std::string(100, 'x'), 100);  // there is room again
   recorder.accepted().second({200, ""});
   EXPECT_TRUE(begins(fourth.answer(), "200"));
+}
+
+// Its refusals name their status, as an API would have it.
+class Api final : public RequestHandler {
+ public:
+  std::optional<Response> refuse(const RequestHead&) override { return std::nullopt; }
+  void handle(const RequestHead&, std::string, Respond respond) override { respond({200, "fine"}); }
+  Response refusal(int status, std::string_view sentence) override {
+    return {status, "{" + std::to_string(status) + ": " + std::string(sentence) + "}", "application/json"};
+  }
+};
+
+TEST(HttpServer, TheHandlerWordsTheRefusalsOfTheServer) {
+  Api api;
+  const auto server = start(api);
+  const std::string head = "POST /a HTTP/1.1\r\nHost: x\r\n";
+  const std::vector<std::pair<std::string, std::string>> refused = {
+      {head + "Transfer-Encoding: chunked\r\n\r\n1\r\nx\r\n0\r\n\r\n", "411"},
+      {head + "Content-Length: 101\r\n\r\nx", "413"},
+      {head + "Content-Length: -1\r\n\r\nx", "400"},
+      {"GET /a HTTP/1.1\r\nContent-Length: 1\r\n\r\nx", "400"},
+      {"GET / HTTP/1.1\r\n" + std::string(20000, 'x'), "431"},
+      {"nonsense\r\n\r\n", "400"}};
+  for (const auto& [request, status] : refused) {
+    Client client(server->url());
+    client.send(request);
+    const std::string answer = client.answer();
+    EXPECT_TRUE(begins(answer, status)) << answer;
+    EXPECT_NE(answer.find("\r\nContent-Type: application/json\r\n"), std::string::npos) << answer;
+    EXPECT_NE(answer.find("\r\n\r\n{" + status + ": "), std::string::npos) << answer;
+  }
 }
 
 TEST(HttpServer, ASlowRequestIsDropped) {

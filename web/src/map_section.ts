@@ -126,10 +126,11 @@ export class MapSection {
 
   private controlsFor(run: Run): Node[] {
     const s = this.settings, summary = run.summary;
+    const number = (root: number): number => run.submaps.filter((other) => other.root < root).length;  // as in bslam map info
     const submaps = run.submaps.length > 1 && h('label', { class: 'check' }, 'Submap ',
       h('select', { change: (event) => { s.submap = Number((event.target as HTMLSelectElement).value); this.submapChosen = true; this.fill(); } },
         ...run.submaps.map((submap, i) => h('option', { value: i, selected: i === s.submap },
-          `${i + 1}${run.live ? '' : `: ${plural(submap.frames, 'frame')}`}${submap.loaded ? ', loaded' : ''}`))));
+          `${number(submap.root)}${run.live ? '' : `: ${plural(submap.frames, 'frame')}`}${submap.loaded ? ', loaded' : ''}`))));
     return [
       submaps,
       radios('Points by', 'colouring', [['height', 'height'], ['age', 'age'], ['plain', 'none']], s.colouring,
