@@ -5,16 +5,16 @@
 namespace bslam {
 namespace {
 
-// Folders of the images of all cameras, numbered from 0; those of camera `late` from 1.
-void write_numbered(const fs::path& data, const fs::path& folder, int late) {
+// Folders of the images of all cameras, numbered from `first`; those of camera `late` from the number after it.
+void write_numbered(const fs::path& data, const fs::path& folder, int late, std::size_t first = 0) {
   for (int c = 0; c < 4; ++c) {
     const std::string camera = "cam" + std::to_string(c);
     std::vector<fs::path> files;
     for (const auto& entry : fs::directory_iterator(data / "mav0" / camera / "data")) files.push_back(entry.path());
-    std::ranges::sort(files);
+    std::ranges::sort(files, {}, [](const fs::path& file) { return std::stoll(file.stem().string()); });
     fs::create_directories(folder / camera);
     for (std::size_t k = 0; k < files.size(); ++k)
-      fs::copy_file(files[k], folder / camera / (std::to_string(k + (c == late ? 1 : 0)) + ".png"));
+      fs::copy_file(files[k], folder / camera / (std::to_string(first + k + (c == late ? 1 : 0)) + ".png"));
   }
 }
 
@@ -57,7 +57,8 @@ TEST_F(CommandLine, ACameraThatIsOneFrameLateIsNamed) {
 TEST_F(CommandLine, AMapHasTheCalibrationOfItsRecordingAndNamesOfItsOwn) {
   const std::string map = out("titled.map");
   summary_of("titled", "--save-map " + map);
-  write_numbered(data(), out("unrigged"), -1);
+  constexpr std::size_t kFirst = 10;  // at 10 Hz, the time stamp of the first simulated image
+  write_numbered(data(), out("unrigged"), -1, kFirst);
   const Ran exported = run("map export " + map + " --format colmap --images " + out("unrigged") + " --rate 10 --out " +
                            out("unrigged_model"));
   EXPECT_EQ(exported.status, 0) << exported.err;
