@@ -68,8 +68,8 @@ struct Dataset {
   std::vector<std::string> sources = {};  // the topic, file or folder of every camera in use
   bool sources_by_name = false;           // they were found by the names of the cameras in the calibration
   bool sources_by_topic = false;          // or by the topics that it names
-  std::vector<std::string> rig_topics =
-      {};  // these topics, one per camera of the calibration, which may be empty; or none
+  // The topics that the calibration names, one per camera of it, which may be empty; or none.
+  std::vector<std::string> rig_topics = {};
   std::vector<image_decoding::PixelFormat> pixel_formats = {};  // one per camera in use
   std::vector<image_decoding::Vignette> vignettes = {};         // one per camera in use, or none
 };
