@@ -1,3 +1,4 @@
+import contextlib
 import http.client
 import http.server
 import json
@@ -83,14 +84,21 @@ class Other(http.server.BaseHTTPRequestHandler):
         pass
 
 
-@pytest.fixture
-def other():
-    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), Other) as server:
+@contextlib.contextmanager
+def served(handler):
+    """The address of a server with these answers."""
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
         thread = threading.Thread(target=server.serve_forever)
         thread.start()
         yield f"http://127.0.0.1:{server.server_port}"
         server.shutdown()
         thread.join()
+
+
+@pytest.fixture
+def other():
+    with served(Other) as address:
+        yield address
 
 
 def test_an_answer_of_another_server_is_an_error_of_the_service(other):
@@ -141,12 +149,8 @@ def test_a_refusal_before_the_end_of_the_request_is_that_of_the_server():
 
 @pytest.fixture
 def proxy():
-    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), Proxy) as server:
-        thread = threading.Thread(target=server.serve_forever)
-        thread.start()
-        yield f"http://127.0.0.1:{server.server_port}"
-        server.shutdown()
-        thread.join()
+    with served(Proxy) as address:
+        yield address
 
 
 @pytest.mark.parametrize(
