@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <limits>
 #include <map>
+#include <numeric>
 #include <optional>
 #include <string_view>
 #include <utility>
@@ -63,6 +64,18 @@ PixelLayout filter_in(std::string_view format) {
   return kept && encoding != nullptr ? encoding->layout : PixelLayout::kFile;
 }
 
+// The numbers of the files of a recording in the order in which they were begun. The messages of one file stay in its
+// order: their times step back where the clock of the recording computer did.
+std::vector<std::uint32_t> files_by_time(const std::vector<std::unique_ptr<containers::MessageFile>>& files) {
+  std::vector<std::uint32_t> out(files.size());
+  std::iota(out.begin(), out.end(), 0u);
+  std::ranges::stable_sort(out, {}, [&](std::uint32_t f) {
+    const auto& messages = files[f]->messages();
+    return messages.empty() ? TimeNs{0} : messages.front().received_ns;
+  });
+  return out;
+}
+
 constexpr std::size_t kBeginning = 512;  // bytes that contain everything before the pixels, unless names are very long
 
 }  // namespace
@@ -74,7 +87,7 @@ const containers::Topic& BagStore::topic_of(const Entry& entry) const {
 std::vector<ImageTopic> BagStore::find_images() {
   std::map<std::pair<std::string, std::string>, ImageTopic> topics;  // by name and type
   std::map<const ImageTopic*, ImageMessage> first;
-  for (std::uint32_t f = 0; f < files_.size(); ++f) {
+  for (const std::uint32_t f : files_by_time(files_)) {
     for (const containers::MessageRef& message : files_[f]->messages()) {
       const containers::Topic& from = files_[f]->topics()[message.topic];
       if (!containers::is_image_type(from.type)) continue;
@@ -100,7 +113,6 @@ std::vector<ImageTopic> BagStore::find_images() {
   }
   std::vector<ImageTopic> out;
   for (auto& [key, topic] : topics) {
-    std::ranges::stable_sort(topic.images, {}, &BagImage::received_ns);
     if (const auto reference = first.find(&topic); reference != first.end()) {
       topic.encoding = reference->second.encoding;
       topic.width = static_cast<int>(std::min<std::uint32_t>(reference->second.width, kMaxImageSidePx + 1));

@@ -38,7 +38,7 @@ struct DatasetRequest {
   double sync_tolerance_s = 0.002;                 // largest time difference within a frame, see IoOptions
   std::optional<double> begin_s = {}, end_s = {};  // seconds from the first frame: begin <= t < end
   TimeStampOptions time_stamps = {};               // unit of the recorded time stamps
-  // Colour filters of the cameras in use, in their order, or one for all; empty: none.
+  // Colour filters of the cameras in use, in their order, or one for all; empty: those that a bag names.
   std::vector<image_decoding::Bayer> bayer = {};
   std::optional<std::filesystem::path> masks = {};      // folder of masks (dataset/mask_folder.h)
   std::optional<std::filesystem::path> vignettes = {};  // folder of vignettes (dataset/vignette_folder.h)

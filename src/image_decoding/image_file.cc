@@ -137,8 +137,9 @@ Error not_readable(const std::filesystem::path& file) {
 
 std::optional<image::Image> decode_grey(std::string_view bytes, const PixelFormat& format) {
   auto image = decode_values(bytes, format.bits);
-  if (!image || format.bayer == Bayer::kNone) return image;
-  return without_colour_filter(*std::move(image), format.bayer);
+  const Bayer filter = format.bayer.value_or(Bayer::kNone);
+  if (!image || filter == Bayer::kNone) return image;
+  return without_colour_filter(*std::move(image), filter);
 }
 
 Result<image::Image> read_image(const std::filesystem::path& file, const PixelFormat& format) {

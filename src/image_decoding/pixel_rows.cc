@@ -114,18 +114,18 @@ std::uint16_t largest_value(const StoredImage& image) {
   return largest;
 }
 
-Bayer filter_of(PixelLayout layout, Bayer other) {
+Bayer filter_of(PixelLayout layout, std::optional<Bayer> chosen) {
   switch (layout) {
     case PixelLayout::kRggb:
-      return Bayer::kRggb;
+      return chosen.value_or(Bayer::kRggb);
     case PixelLayout::kBggr:
-      return Bayer::kBggr;
+      return chosen.value_or(Bayer::kBggr);
     case PixelLayout::kGrbg:
-      return Bayer::kGrbg;
+      return chosen.value_or(Bayer::kGrbg);
     case PixelLayout::kGbrg:
-      return Bayer::kGbrg;
+      return chosen.value_or(Bayer::kGbrg);
     case PixelLayout::kGrey:
-      return other;
+      return chosen.value_or(Bayer::kNone);
     default:
       return Bayer::kNone;
   }

@@ -18,7 +18,8 @@ std::optional<image::Image> grey_of_rows(const image_files::StoredImage& image, 
 // Returns the largest value of an image with values of two bytes; 0 if the rows do not fit into the bytes.
 std::uint16_t largest_value(const image_files::StoredImage& image);
 
-// Returns the colour filter of a layout; `other` for grey images.
-Bayer filter_of(image_files::PixelLayout layout, Bayer other);
+// Returns the colour filter of an image of this layout: `chosen`, or that of the layout if none was chosen. Colour
+// images have none.
+Bayer filter_of(image_files::PixelLayout layout, std::optional<Bayer> chosen);
 
 }  // namespace bslam::image_decoding

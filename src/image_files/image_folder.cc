@@ -4,12 +4,15 @@
 
 #include <algorithm>
 #include <array>
+#include <iterator>
+#include <span>
 #include <string_view>
 #include <system_error>
 
 #include "base/atomic_file.h"
 #include "base/exact_seconds.h"
 #include "base/lower_case.h"
+#include "base/median.h"
 #include "base/number_text.h"
 
 namespace bslam::image_files {
@@ -42,6 +45,52 @@ std::size_t remove_damaged_zeros(std::vector<ImageFile>& images) {
   if (!(follows ? others.front() / kPause > interval : far)) return 0;
   std::erase_if(images, [](const ImageFile& image) { return image.time_ns == 0; });
   return zeros;
+}
+
+// Returns true if the clock was set back between `before` and `after`, two ascending runs of time stamps: there are
+// images more often at the times of both runs than at the times of one.
+bool is_set_back(std::span<const TimeNs> before, std::span<const TimeNs> after) {
+  constexpr std::ptrdiff_t kEnough = 3;  // images of each run at the times of both, and intervals at other times
+  constexpr double kDenser = 0.75;       // half the interval for runs of the same rate
+  const TimeNs from = std::max(before.front(), after.front()), to = std::min(before.back(), after.back());
+  const auto is_inside = [&](TimeNs time) { return time >= from && time <= to; };
+  if (std::ranges::count_if(before, is_inside) < kEnough || std::ranges::count_if(after, is_inside) < kEnough)
+    return false;
+  std::vector<TimeNs> all, outside;
+  std::ranges::merge(before, after, std::back_inserter(all));
+  for (std::size_t k = 1; k < all.size(); ++k) {
+    if (all[k] <= from || all[k - 1] >= to) outside.push_back(all[k] - all[k - 1]);
+  }
+  if (std::ssize(outside) < kEnough) return false;
+  const double interval =
+      static_cast<double>(to - from) / static_cast<double>(std::ranges::count_if(all, is_inside) - 1);
+  return interval < kDenser * static_cast<double>(median(outside));
+}
+
+// If the clock was set back during a recording, images after that have times of images before, but show other moments,
+// and sorting would mix the two. Removes those after and returns their number.
+std::size_t remove_times_after_set_back(std::vector<ImageFile>& images) {
+  std::vector<TimeNs> times;
+  std::ranges::transform(images, std::back_inserter(times), &ImageFile::time_ns);
+  std::size_t first_after = 0;  // behind the largest step
+  TimeNs largest = 0;
+  for (std::size_t k = 1; k < times.size(); ++k) {
+    if (times[k - 1] - times[k] <= largest) continue;
+    first_after = k;
+    largest = times[k - 1] - times[k];
+  }
+  if (first_after == 0) return 0;
+  const auto before = std::span(times).first(first_after), after = std::span(times).subspan(first_after);
+  std::ranges::sort(before);
+  std::ranges::sort(after);
+  if (!is_set_back(before, after)) return 0;
+  const auto begin = images.begin() + static_cast<std::ptrdiff_t>(first_after);
+  const auto kept = std::remove_if(begin, images.end(), [&](const ImageFile& image) {
+    return image.time_ns >= before.front() && image.time_ns <= before.back();
+  });
+  const auto count = static_cast<std::size_t>(images.end() - kept);
+  images.erase(kept, images.end());
+  return count;
 }
 
 // Returns a text with the number of backward steps of time stamps and the first of them; empty if there are none.
@@ -83,6 +132,11 @@ ImageList in_time_order(std::vector<ImageFile> images, const std::string& source
     list.warnings.push_back(fmt::format("{}: {} {} the damaged time stamp 0 and {} not used", source,
                                         images_text(damaged), damaged == 1 ? "has" : "have",
                                         damaged == 1 ? "is" : "are"));
+  }
+  while (const std::size_t removed = remove_times_after_set_back(images)) {
+    list.warnings.push_back(
+        fmt::format("{}: the clock was set back during the recording; {} with times that had been before {} not used",
+                    source, images_text(removed), removed == 1 ? "is" : "are"));
   }
   if (std::string text = steps_back_text(images, unit); !text.empty()) {
     list.warnings.push_back(fmt::format("{}: {}", source, text));

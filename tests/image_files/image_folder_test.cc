@@ -1,6 +1,10 @@
 #include "image_files/image_folder.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
 
 namespace bslam::image_files {
 namespace {
@@ -22,6 +26,55 @@ TEST(TimeOrder, StepsBackAreCountedAndTheFirstIsNamed) {
             "cam0: time stamps step back 1 time, first from 1000000000.000000119 s to 1000000000.000000003 s; images "
             "have been sorted");
   EXPECT_TRUE(sorted({1, 2, 3}).warnings.empty());
+}
+
+// Stamps of `count` images from `first` on, `interval` apart.
+void append(std::vector<TimeNs>& stamps, TimeNs first, TimeNs interval, int count) {
+  for (int k = 0; k < count; ++k) stamps.push_back(first + k * interval);
+}
+
+TEST(TimeOrder, ImagesOfTimesThatTheClockPassesTwiceAreNotMixed) {
+  for (const TimeNs step : {230, 245, 300, 1200, 2600}) {  // the last by more than the rest of the recording
+    std::vector<TimeNs> stamps;
+    append(stamps, 10'000, 50, 60);
+    std::swap(stamps[20], stamps[21]);  // messages that overtook each other are no step of the clock
+    append(stamps, stamps.back() + 50 - step, 50, 40);
+    const ImageList list = sorted(stamps);
+    const auto removed = std::ranges::count_if(stamps.begin() + 60, stamps.end(), [](TimeNs t) { return t <= 12'950; });
+    EXPECT_EQ(list.images.size(), 100u - static_cast<std::size_t>(removed)) << step;
+    EXPECT_EQ(list.warnings[0], fmt::format("cam0: the clock was set back during the recording; {} images with times "
+                                            "that had been before are not used",
+                                            removed));
+    EXPECT_TRUE(std::ranges::is_sorted(list.images, {}, &ImageFile::time_ns));
+  }
+}
+
+TEST(TimeOrder, EveryStepOfTheClockIsSaid) {
+  std::vector<TimeNs> stamps;
+  append(stamps, 10'000, 50, 40);
+  append(stamps, 11'520, 50, 40);
+  append(stamps, 12'770, 50, 40);
+  const ImageList list = sorted(stamps);
+  EXPECT_EQ(std::ranges::count_if(list.warnings,
+                                  [](const std::string& w) { return w.find("set back") != std::string::npos; }),
+            2);
+  EXPECT_EQ(list.warnings.size(), 2u);
+}
+
+TEST(TimeOrder, ImagesThatAreListedInPartsAreAllUsed) {
+  std::vector<TimeNs> two_writers, resent, shuffled;
+  append(two_writers, 10'000, 100, 30);
+  append(two_writers, 10'050, 100, 30);
+  append(resent, 10'000, 50, 20);
+  append(resent, 11'500, 50, 20);
+  append(resent, 11'000, 50, 10);
+  append(shuffled, 10'000, 50, 60);
+  std::shuffle(shuffled.begin(), shuffled.end(), std::mt19937(1));
+  for (const auto& stamps : {two_writers, resent, shuffled}) {
+    const ImageList list = sorted(stamps);
+    EXPECT_EQ(list.images.size(), stamps.size());
+    EXPECT_TRUE(std::ranges::is_sorted(list.images, {}, &ImageFile::time_ns));
+  }
 }
 
 TEST(TimeOrder, ImagesWithTheStampOfAnotherAreCounted) {
