@@ -38,6 +38,11 @@ struct EvalArguments {
   bool json = false;
 };
 
+// The arguments and the comments of the files that they name.
+struct EvalInput : EvalArguments {
+  evaluation::TrajectoryComments of_estimate, of_truth;
+};
+
 AlignMode align_mode(const std::string& name) {
   if (name == "sim3") return AlignMode::kSim3;
   return name == "none" ? AlignMode::kNone : AlignMode::kSe3;
@@ -59,27 +64,25 @@ Status check_plot(const EvalArguments& a) {
 }
 
 // The frame of the poses of the estimate; empty if it is not known.
-std::string frame_of_estimate(const EvalArguments& arguments) {
-  const auto comments = evaluation::read_comments(arguments.estimate);
-  return arguments.camera ? comments.frame : comments.frame_of_poses();
+std::string frame_of_estimate(const EvalInput& input) {
+  return input.camera ? input.of_estimate.frame : input.of_estimate.frame_of_poses();
 }
 
 // Whether the ground truth is an EuRoC csv with poses of the body, as that of EuRoC itself.
-bool is_euroc_truth(const EvalArguments& arguments) {
-  const auto comments = evaluation::read_comments(arguments.ground_truth);
-  return comments.euroc_csv && comments.frame_of_poses() == "body";
+bool is_euroc_truth(const EvalInput& input) {
+  return input.of_truth.euroc_csv && input.of_truth.frame_of_poses() == "body";
 }
 
 // What is not known from the files about the frames of their poses.
-void note_of_frames(const EvalArguments& arguments) {
-  const bool of_body = frame_of_estimate(arguments) == "body";
-  if (of_body && evaluation::read_comments(arguments.estimate).frame.empty()) {
+void note_of_frames(const EvalInput& input) {
+  const bool of_body = frame_of_estimate(input) == "body";
+  if (of_body && input.of_estimate.frame.empty()) {
     print_message(
         "note: the poses of {}, which is an EuRoC csv, are taken to be those of the body; --rig FILE --camera N says "
         "that they are those of a camera\n",
-        arguments.estimate);
+        input.estimate);
   }
-  if (!of_body && arguments.gt_frame == "cam0" && is_euroc_truth(arguments)) {
+  if (!of_body && input.gt_frame == "cam0" && is_euroc_truth(input)) {
     print_message(
         "note: EuRoC ground truth contains poses of the body; use --gt-frame body --rig FILE to compare it with "
         "a camera\n");
@@ -88,44 +91,43 @@ void note_of_frames(const EvalArguments& arguments) {
 
 // Returns T_cam_frame of the frame of the ground truth and of the camera, or body, of the estimate; nullopt if both
 // paths are in one frame.
-Result<std::optional<geometry::SE3>> frame_of_truth(const EvalArguments& arguments) {
-  const std::string frame = frame_of_estimate(arguments);
-  if (frame == "body" && (arguments.gt_frame == "body" || is_euroc_truth(arguments)))
-    return std::optional<geometry::SE3>();
-  if (arguments.gt_frame != "body" && !arguments.rig) {
+Result<std::optional<geometry::SE3>> frame_of_truth(const EvalInput& input) {
+  const std::string frame = frame_of_estimate(input);
+  if (frame == "body" && (input.gt_frame == "body" || is_euroc_truth(input))) return std::optional<geometry::SE3>();
+  if (input.gt_frame != "body" && !input.rig) {
     if (!frame.empty() && frame != "cam0") {
       print_message(
           "note: {} contains poses of {}; the ground truth is taken to be of the same frame. --rig FILE compares "
           "it with poses of camera 0\n",
-          arguments.estimate, frame);
+          input.estimate, frame);
     }
     return std::optional<geometry::SE3>();
   }
-  if (!arguments.rig) {
+  if (!input.rig) {
     return Error{.file = "command line",
                  .key = "--gt-frame body",
                  .found = "no --rig",
                  .expected = "--rig FILE with the pose of the camera on the body"};
   }
-  const auto rig = rig_formats::read_rig(*arguments.rig);
+  const auto rig = rig_formats::read_rig(*input.rig);
   if (!rig) return rig.error();
-  if (frame == "body" && !arguments.camera) return std::optional(rig->body_from_first(0));
-  const auto camera = camera_of_trajectory(arguments.estimate, *rig, *arguments.rig, arguments.camera);
+  if (frame == "body" && !input.camera) return std::optional(rig->body_from_first(0));
+  const auto camera = camera_of_trajectory(input.estimate, input.of_estimate, *rig, *input.rig, input.camera);
   if (!camera) return camera.error();
-  if (arguments.gt_frame == "body") note_of_body(*rig, *arguments.rig);
-  return std::optional(arguments.gt_frame == "body" ? rig->body_from_first(*camera).inverse()
-                                                    : rig->rig_from_first(*camera).inverse());
+  if (input.gt_frame == "body") note_of_body(*rig, *input.rig);
+  return std::optional(input.gt_frame == "body" ? rig->body_from_first(*camera).inverse()
+                                                : rig->rig_from_first(*camera).inverse());
 }
 
-void move_to_one_frame(const geometry::SE3& T_cam_frame, const EvalArguments& arguments, Trajectory& estimate,
+void move_to_one_frame(const geometry::SE3& T_cam_frame, const EvalInput& input, Trajectory& estimate,
                        Trajectory& truth) {
-  const bool metric = evaluation::read_comments(arguments.estimate).scale == "metric";
+  const bool metric = input.of_estimate.scale == "metric";
   const double distance_m = evaluation::move_to_one_frame(T_cam_frame, metric, estimate, truth);
   if (distance_m == 0) return;
   print_message(
       "note: the unit of {} is not the metre: the ground truth was moved by {:.3f} m to its camera, by the rig and "
       "the orientations of the ground truth\n",
-      arguments.estimate, distance_m);
+      input.estimate, distance_m);
 }
 
 nlohmann::ordered_json number(double value) {
@@ -159,7 +161,7 @@ std::string coverage_text(const TrajectoryEvaluation& e) {
   return all == part ? all : fmt::format("{}; from the first to the last pose {}", all, part);
 }
 
-std::string table_text(const TrajectoryEvaluation& e, const EvalArguments& arguments) {
+std::string table_text(const TrajectoryEvaluation& e, const EvalInput& input) {
   const auto row = [](std::string_view name, const std::string& value) {
     return fmt::format("{:<23} {}\n", name, value);
   };
@@ -171,59 +173,58 @@ std::string table_text(const TrajectoryEvaluation& e, const EvalArguments& argum
   return row("ATE, position", errors(e.ate, "m")) +
          row(fmt::format("RPE over {:g} s, position", e.rpe.delta_s), errors(e.rpe.translation_m, "m")) +
          row(fmt::format("RPE over {:g} s, rotation", e.rpe.delta_s), errors(e.rpe.rotation_deg, "deg")) +
-         row("alignment", arguments.align) +
+         row("alignment", input.align) +
          row("scale of best fit", e.scale ? fmt::format("{:.6f}", *e.scale) : "not determined") +
          row("coverage", coverage_text(e)) + row("ground truth, length", fmt::format("{:.3f} m", e.gt_length_m));
 }
 
 // Tools such as evo_ape take the ground truth first.
-void note_of_order(const EvalArguments& a) {
-  const bool of_estimate = evaluation::read_comments(a.estimate).frame.empty();
-  if (of_estimate && !evaluation::read_comments(a.ground_truth).frame.empty()) {
+void note_of_order(const EvalInput& input) {
+  if (input.of_estimate.frame.empty() && !input.of_truth.frame.empty()) {
     print_message("note: {} was estimated by bslam, but is given as the ground truth: the estimate comes first\n",
-                  a.ground_truth);
+                  input.ground_truth);
   }
 }
 
-Result<TrajectoryEvaluation> evaluate_files(const EvalArguments& arguments) {
-  if (const Status status = check_plot(arguments); !status) return status.error();
-  auto read = evaluation::read_trajectory(arguments.estimate, arguments.times);
+Result<TrajectoryEvaluation> evaluate_files(const EvalInput& input) {
+  if (const Status status = check_plot(input); !status) return status.error();
+  auto read = evaluation::read_trajectory(input.estimate, input.times);
   if (!read) return read.error();
-  auto ground_truth = evaluation::read_trajectory(arguments.ground_truth, arguments.times);
+  auto ground_truth = evaluation::read_trajectory(input.ground_truth, input.times);
   if (!ground_truth) return ground_truth.error();
-  note_of_order(arguments);
-  note_of_frames(arguments);
-  if (const std::string scale = evaluation::read_comments(arguments.estimate).scale;
-      scale != "metric" && arguments.align != "sim3") {
+  note_of_order(input);
+  note_of_frames(input);
+  if (const std::string scale = input.of_estimate.scale; scale != "metric" && input.align != "sim3") {
     print_message("note: the scale of {} is {}, so that its errors are mainly those of the scale; use --align sim3\n",
-                  arguments.estimate, scale);
+                  input.estimate, scale);
   }
-  const auto T_cam_frame = frame_of_truth(arguments);
+  const auto T_cam_frame = frame_of_truth(input);
   if (!T_cam_frame) return T_cam_frame.error();
   Trajectory estimate = *std::move(read);
-  if (*T_cam_frame) move_to_one_frame(**T_cam_frame, arguments, estimate, *ground_truth);
-  const evaluation::EvaluationOptions options{.align = align_mode(arguments.align),
-                                              .max_dt_ns = from_seconds(arguments.max_dt_s),
-                                              .rpe_delta_s = arguments.delta_s};
+  if (*T_cam_frame) move_to_one_frame(**T_cam_frame, input, estimate, *ground_truth);
+  const evaluation::EvaluationOptions options{
+      .align = align_mode(input.align), .max_dt_ns = from_seconds(input.max_dt_s), .rpe_delta_s = input.delta_s};
   auto result = evaluation::evaluate(estimate, *ground_truth, options);
   if (!result) {
     Error error = result.error();
-    error.file = arguments.estimate;
+    error.file = input.estimate;
     return error;
   }
-  if (arguments.plot) {
-    const std::string title = std::filesystem::path(arguments.estimate).filename().string() + " against " +
-                              std::filesystem::path(arguments.ground_truth).filename().string();
+  if (input.plot) {
+    const std::string title = std::filesystem::path(input.estimate).filename().string() + " against " +
+                              std::filesystem::path(input.ground_truth).filename().string();
     const std::string svg = report::trajectory_plot_svg(report::evaluation_plot_input(*result, *ground_truth, title));
-    if (const Status status = write_atomically(*arguments.plot, svg); !status) return status.error();
+    if (const Status status = write_atomically(*input.plot, svg); !status) return status.error();
   }
   return result;
 }
 
 int run_eval(const EvalArguments& arguments) {
-  const auto result = evaluate_files(arguments);
+  const EvalInput input = {arguments, evaluation::read_comments(arguments.estimate),
+                           evaluation::read_comments(arguments.ground_truth)};
+  const auto result = evaluate_files(input);
   if (!result) return report_error(result.error());
-  const std::string text = arguments.json ? json_text(*result) : table_text(*result, arguments);
+  const std::string text = input.json ? json_text(*result) : table_text(*result, input);
   std::fwrite(text.data(), 1, text.size(), stdout);
   return kExitOk;
 }

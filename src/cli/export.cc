@@ -36,11 +36,15 @@ struct TrajectoryArguments {
   bool overwrite = false;
 };
 
+// The arguments and the comments of the trajectory.
+struct ExportInput : TrajectoryArguments {
+  evaluation::TrajectoryComments comments;
+};
+
 // The frame of the poses in the file. If it does not name one, or cam0, --camera decides.
-std::string frame_in_file(const TrajectoryArguments& arguments) {
-  const auto input = evaluation::read_comments(arguments.file);
-  const std::string frame = arguments.camera ? input.frame : input.frame_of_poses();
-  return frame.empty() || frame == "cam0" ? "cam" + std::to_string(arguments.camera.value_or(0)) : frame;
+std::string frame_in_file(const ExportInput& input) {
+  const std::string frame = input.camera ? input.comments.frame : input.comments.frame_of_poses();
+  return frame.empty() || frame == "cam0" ? "cam" + std::to_string(input.camera.value_or(0)) : frame;
 }
 
 // The calibration, and the camera whose poses the trajectory contains. Poses of the body are converted to camera 0
@@ -50,19 +54,19 @@ struct TrajectoryRig {
   std::size_t camera = 0;
 };
 
-Result<TrajectoryRig> rig_of_trajectory(const TrajectoryArguments& arguments, const std::string& needed_by) {
-  if (!arguments.rig) return Error{"command line", needed_by, "no --rig", "--rig FILE, the calibration of the run"};
-  auto rig = rig_formats::read_rig(*arguments.rig);
+Result<TrajectoryRig> rig_of_trajectory(const ExportInput& input, const std::string& needed_by) {
+  if (!input.rig) return Error{"command line", needed_by, "no --rig", "--rig FILE, the calibration of the run"};
+  auto rig = rig_formats::read_rig(*input.rig);
   if (!rig) return rig.error();
-  if (frame_in_file(arguments) == "body") return TrajectoryRig{*std::move(rig), 0};
-  const auto camera = camera_of_trajectory(arguments.file, *rig, *arguments.rig, arguments.camera);
+  if (frame_in_file(input) == "body") return TrajectoryRig{*std::move(rig), 0};
+  const auto camera = camera_of_trajectory(input.file, input.comments, *rig, *input.rig, input.camera);
   if (!camera) return camera.error();
   return TrajectoryRig{*std::move(rig), *camera};
 }
 
 // T_cam_frame of the frame of this name, the body or a camera, and of the camera of the trajectory.
-Result<SE3> frame_in_camera(const std::string& name, const TrajectoryArguments& arguments) {
-  const auto source = rig_of_trajectory(arguments, "--frame " + name);
+Result<SE3> frame_in_camera(const std::string& name, const ExportInput& input) {
+  const auto source = rig_of_trajectory(input, "--frame " + name);
   if (!source) return source.error();
   const auto& [rig, camera] = *source;
   if (name == "body") return rig.body_from_first(camera).inverse();
@@ -76,34 +80,34 @@ Result<SE3> frame_in_camera(const std::string& name, const TrajectoryArguments& 
 }
 
 // T_body_cam of the camera of the trajectory, where an upward axis of the body needs it.
-Result<SE3> camera_on_body(const geometry::UpAxis& up, const TrajectoryArguments& arguments) {
+Result<SE3> camera_on_body(const geometry::UpAxis& up, const ExportInput& input) {
   if (up.frame != geometry::UpAxis::Frame::kBody) return SE3();
-  const auto source = rig_of_trajectory(arguments, "--up " + arguments.up);
+  const auto source = rig_of_trajectory(input, "--up " + input.up);
   if (!source) return source.error();
   return source->rig.body_from_first(source->camera);
 }
 
 // The rotation of the world's axes: that of the map if one is given, so that the path fits maps exported for ROS.
-Result<SE3> upright_axes_of(const Trajectory& trajectory, const TrajectoryArguments& arguments) {
+Result<SE3> upright_axes_of(const Trajectory& trajectory, const ExportInput& input) {
   std::optional<geometry::UpAxis> up;
-  if (!arguments.up.empty()) {
-    const auto parsed = geometry::parse_up_axis(arguments.up);
+  if (!input.up.empty()) {
+    const auto parsed = geometry::parse_up_axis(input.up);
     if (!parsed) return parsed.error();
     up = *parsed;
   } else {
     print_message("note: {}\n", map_export::upward_note());
   }
-  if (!arguments.map) {
+  if (!input.map) {
     std::vector<SE3> poses;
     for (const evaluation::TimedPose& pose : trajectory) poses.push_back(pose.T_world_frame);
     if (!up) return geometry::upright_axes(poses);
-    const auto T_body_cam = camera_on_body(*up, arguments);
+    const auto T_body_cam = camera_on_body(*up, input);
     if (!T_body_cam) return T_body_cam.error();
     const auto up_world = geometry::up_in_world(*up, poses, *T_body_cam);
     if (!up_world) return up_world.error();
     return geometry::upright_axes(poses, *up_world);
   }
-  const auto saved = storage::read_map(arguments.map->string());
+  const auto saved = storage::read_map(input.map->string());
   if (!saved) return saved.error();
   const auto selection = map_export::select_submap(saved->map, std::nullopt, up);
   if (!selection) return selection.error();
@@ -111,16 +115,15 @@ Result<SE3> upright_axes_of(const Trajectory& trajectory, const TrajectoryArgume
 }
 
 // Whether the times that are written are those that the images were recorded with.
-bool writes_image_stamps(const TrajectoryArguments& arguments, const evaluation::TrajectoryComments& input) {
-  return arguments.stamps == "image" || (arguments.stamps.empty() && input.image_stamps);
+bool writes_image_stamps(const ExportInput& input) {
+  return input.stamps == "image" || (input.stamps.empty() && input.comments.image_stamps);
 }
 
 // Subtracts the time offset of the camera, or adds it, if the times of the input are not those that are written.
-Status convert_stamps(const TrajectoryArguments& arguments, Trajectory& trajectory) {
-  const auto input = evaluation::read_comments(arguments.file);
-  const bool image_stamps = writes_image_stamps(arguments, input);
-  if (image_stamps == input.image_stamps) return {};
-  const auto source = rig_of_trajectory(arguments, "--stamps " + arguments.stamps);
+Status convert_stamps(const ExportInput& input, Trajectory& trajectory) {
+  const bool image_stamps = writes_image_stamps(input);
+  if (image_stamps == input.comments.image_stamps) return {};
+  const auto source = rig_of_trajectory(input, "--stamps " + input.stamps);
   if (!source) return source.error();
   const TimeNs offset_ns = source->rig.camera(source->camera).time_offset_ns;
   for (evaluation::TimedPose& pose : trajectory) pose.time_ns += image_stamps ? -offset_ns : offset_ns;
@@ -128,74 +131,73 @@ Status convert_stamps(const TrajectoryArguments& arguments, Trajectory& trajecto
 }
 
 // Whose poses are written: by default those of the input.
-std::string frame_of_output(const TrajectoryArguments& arguments) {
-  return arguments.frame.empty() ? frame_in_file(arguments) : arguments.frame;
+std::string frame_of_output(const ExportInput& input) {
+  return input.frame.empty() ? frame_in_file(input) : input.frame;
 }
 
 // T_file_cam of the poses in the file: the pose of camera 0 on the body if they are those of the body.
-Result<SE3> camera_in_file(const TrajectoryArguments& arguments) {
-  if (frame_in_file(arguments) != "body") return SE3();
-  const auto source = rig_of_trajectory(arguments, "poses of the body");
+Result<SE3> camera_in_file(const ExportInput& input) {
+  if (frame_in_file(input) != "body") return SE3();
+  const auto source = rig_of_trajectory(input, "poses of the body");
   if (!source) return source.error();
   return source->rig.body_from_first(source->camera);
 }
 
 // T_cam_frame of the requested frame and of the camera of the trajectory. `T_file_cam`: see camera_in_file.
-Result<SE3> wanted_frame(const TrajectoryArguments& arguments, const SE3& T_file_cam) {
-  const std::string frame = frame_of_output(arguments), own = frame_in_file(arguments);
+Result<SE3> wanted_frame(const ExportInput& input, const SE3& T_file_cam) {
+  const std::string frame = frame_of_output(input), own = frame_in_file(input);
   if (own == "body" && frame == own) return T_file_cam.inverse();
-  if (arguments.frame.empty() || (!arguments.camera && frame == own)) return SE3();
-  const auto T_cam_frame = frame_in_camera(frame, arguments);
+  if (input.frame.empty() || (!input.camera && frame == own)) return SE3();
+  const auto T_cam_frame = frame_in_camera(frame, input);
   const double distance_m = T_cam_frame ? (T_file_cam * *T_cam_frame).translation().norm() : 0;
-  if (distance_m > 0 && evaluation::read_comments(arguments.file).scale != "metric") {
+  if (distance_m > 0 && input.comments.scale != "metric") {
     print_message(
         "note: the {} is {:.3f} m away from {}, but the unit of {} is not the metre: the distance is added to the path "
         "as it is\n",
-        own == "body" ? "body" : "camera", distance_m, frame, arguments.file);
+        own == "body" ? "body" : "camera", distance_m, frame, input.file);
   }
   return T_cam_frame;
 }
 
-Result<Trajectory> converted(const TrajectoryArguments& arguments) {
-  const auto read = evaluation::read_trajectory(arguments.file, arguments.times);
+Result<Trajectory> converted(const ExportInput& input) {
+  const auto read = evaluation::read_trajectory(input.file, input.times);
   if (!read) return read.error();
-  const auto T_file_cam = camera_in_file(arguments);
+  const auto T_file_cam = camera_in_file(input);
   if (!T_file_cam) return T_file_cam.error();
   Trajectory trajectory = evaluation::moved_to_frame(*read, *T_file_cam);
   SE3 T_upright_world;
-  if (arguments.axes == "ros") {
-    const auto axes = upright_axes_of(trajectory, arguments);
+  if (input.axes == "ros") {
+    const auto axes = upright_axes_of(trajectory, input);
     if (!axes) return axes.error();
     T_upright_world = *axes;
   }
-  const auto frame = wanted_frame(arguments, *T_file_cam);
+  const auto frame = wanted_frame(input, *T_file_cam);
   if (!frame) return frame.error();
   SE3 T_cam_frame = *frame;
-  if (arguments.axes == "ros" && frame_of_output(arguments) != "body") {
+  if (input.axes == "ros" && frame_of_output(input) != "body") {
     geometry::Matrix3d R_cam_ros;  // x forward, y left, z up in a camera's x right, y down, z forward
     R_cam_ros << 0, -1, 0, 0, 0, -1, 1, 0, 0;
     T_cam_frame = T_cam_frame * SE3(R_cam_ros, geometry::Vector3d::Zero());
   }
   trajectory = evaluation::moved_to_frame(trajectory, T_cam_frame);
   for (evaluation::TimedPose& pose : trajectory) pose.T_world_frame = T_upright_world * pose.T_world_frame;
-  if (const Status s = convert_stamps(arguments, trajectory); !s) return s.error();
+  if (const Status s = convert_stamps(input, trajectory); !s) return s.error();
   return trajectory;
 }
 
-// The world of the exported poses, which was `parent`. Upright axes without a map are those of this trajectory only.
-std::string parent_frame(const TrajectoryArguments& arguments, const std::string& parent) {
-  if (arguments.axes != "ros") return parent;
-  return arguments.map ? "map" : parent + "_ros";
+// The world of the exported poses. Upright axes without a map are those of this trajectory only.
+std::string parent_frame(const ExportInput& input) {
+  if (input.axes != "ros") return input.comments.parent;
+  return input.map ? "map" : input.comments.parent + "_ros";
 }
 
 // The comments of the exported file. If lengths are not metres in the source, they are not metres here either.
-std::string comments(const TrajectoryArguments& arguments, const std::string& frame) {
-  const auto input = evaluation::read_comments(arguments.file);
-  const std::string whole_name = arguments.axes == "ros" ? frame + "_ros" : frame;
-  std::string out = evaluation::trajectory_header(whole_name, input.state, parent_frame(arguments, input.parent));
-  if (input.scale != "metric") out += "\n# " + evaluation::scale_comment(input.scale);
-  if (writes_image_stamps(arguments, input)) out += "\n# " + evaluation::image_stamp_comment();
-  return out;
+std::string header_of(const ExportInput& input, const std::string& frame) {
+  evaluation::TrajectoryComments out = input.comments;
+  out.frame = input.axes == "ros" ? frame + "_ros" : frame;
+  out.parent = parent_frame(input);
+  out.image_stamps = writes_image_stamps(input);
+  return evaluation::text_of(out);
 }
 
 // Neither the trajectory nor another file of the input is replaced.
@@ -212,26 +214,27 @@ Status check_out(const TrajectoryArguments& a) {
 }
 
 // Poses of the body are converted by the rig; those with other axes are not.
-Status check_frame(const TrajectoryArguments& arguments) {
-  const std::string frame = frame_in_file(arguments);
+Status check_frame(const ExportInput& input) {
+  const std::string frame = frame_in_file(input);
   if (frame.ends_with("_ros"))
-    return Error{arguments.file, "frame", frame, "a trajectory of a camera, as bslam run writes it"};
-  if (frame == "body" && (!arguments.rig || arguments.camera))
-    return Error{arguments.file, "frame", frame,
+    return Error{input.file, "frame", frame, "a trajectory of a camera, as bslam run writes it"};
+  if (frame == "body" && (!input.rig || input.camera))
+    return Error{input.file, "frame", frame,
                  "a trajectory of a camera, as bslam run writes it, or --rig FILE without --camera"};
   return {};
 }
 
 int run_export(const TrajectoryArguments& arguments) {
   if (const Status s = check_out(arguments); !s) return report_error(s.error());
-  if (const Status s = check_frame(arguments); !s) return report_error(s.error());
+  const ExportInput input = {arguments, evaluation::read_comments(arguments.file)};
+  if (const Status s = check_frame(input); !s) return report_error(s.error());
   if (!arguments.up.empty() && arguments.axes != "ros")
     return report_error({"command line", "--up", "no --axes ros", "--axes ros"});
-  const auto trajectory = converted(arguments);
+  const auto trajectory = converted(input);
   if (!trajectory) return report_error(trajectory.error());
   using enum evaluation::TrajectoryFormat;
   const auto format = arguments.format == "euroc" ? kEurocCsv : arguments.format == "kitti" ? kKitti : kTum;
-  const std::string header = comments(arguments, frame_of_output(arguments));
+  const std::string header = header_of(input, frame_of_output(input));
   const Status status = evaluation::write_trajectory(arguments.out, *trajectory, format, header, arguments.overwrite);
   if (!status) return report_error(status.error());
   std::printf("%s: %zu pose%s\n", arguments.out.c_str(), trajectory->size(), trajectory->size() == 1 ? "" : "s");

@@ -31,15 +31,14 @@ int map_transfer(const TransferArguments& arguments) {
   const auto input = evaluation::read_comments(arguments.trajectory);
   const auto moved = session::transfer_trajectory(*trajectory, *own, *merged, input);
   if (!moved) return report_error(moved.error());
-  const std::string parent = evaluation::world_of_submap(moved->submap), frame = input.frame_of_poses();
-  std::string comments = evaluation::trajectory_header(frame.empty() ? "cam0" : frame, input.state, parent);
-  if (input.scale != "metric") comments += "\n# " + evaluation::scale_comment(input.scale);
-  if (input.image_stamps) comments += "\n# " + evaluation::image_stamp_comment();
-  const Status s =
-      evaluation::write_trajectory(arguments.out, moved->poses, evaluation::TrajectoryFormat::kTum, comments);
+  evaluation::TrajectoryComments output = input;
+  output.parent = evaluation::world_of_submap(moved->submap);
+  output.frame = input.frame_of_poses().empty() ? "cam0" : input.frame_of_poses();
+  const Status s = evaluation::write_trajectory(arguments.out, moved->poses, evaluation::TrajectoryFormat::kTum,
+                                                evaluation::text_of(output));
   if (!s) return report_error(s.error());
   fmt::print("{} poses, transformed by {} keyframes that both maps contain, are in the frame {}\n{}\n",
-             moved->poses.size(), moved->keyframes, parent, arguments.out);
+             moved->poses.size(), moved->keyframes, output.parent, arguments.out);
   return kExitOk;
 }
 

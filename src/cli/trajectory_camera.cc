@@ -6,13 +6,12 @@
 
 #include "camera/camera_name.h"
 #include "cli/print_message.h"
-#include "evaluation/trajectory_file.h"
 
 namespace bslam::cli {
 
-Result<std::size_t> camera_of_trajectory(const std::filesystem::path& trajectory, const camera::Rig& rig,
+Result<std::size_t> camera_of_trajectory(const std::filesystem::path& trajectory,
+                                         const evaluation::TrajectoryComments& comments, const camera::Rig& rig,
                                          const std::filesystem::path& rig_file, std::optional<int> option) {
-  const auto comments = evaluation::read_comments(trajectory);
   const std::string frame = option ? comments.frame : comments.frame_of_poses();
   const auto named = camera::camera_of_frame(frame, rig);
   if (!option) {

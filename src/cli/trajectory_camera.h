@@ -8,13 +8,15 @@
 
 #include "base/result.h"
 #include "camera/rig.h"
+#include "evaluation/trajectory_header.h"
 
 namespace bslam::cli {
 
-// The camera of the rig whose poses the trajectory contains: `option` (--camera) if given, else the one that the first
-// line of the trajectory names; camera 0 if it names none. Prints a note if both contradict each other. Errors: there
+// The camera of the rig whose poses the trajectory contains: `option` (--camera) if given, else the one that its
+// comments name; camera 0 if they name none. Prints a note if both contradict each other. Errors: there
 // is no such camera; the trajectory is that of a body, or has other axes.
-Result<std::size_t> camera_of_trajectory(const std::filesystem::path& trajectory, const camera::Rig& rig,
+Result<std::size_t> camera_of_trajectory(const std::filesystem::path& trajectory,
+                                         const evaluation::TrajectoryComments& comments, const camera::Rig& rig,
                                          const std::filesystem::path& rig_file, std::optional<int> option);
 
 }  // namespace bslam::cli

@@ -66,4 +66,11 @@ std::string trajectory_header(std::string_view frame, PoseState state, std::stri
   return fmt::format("{} frame={} parent={} final={}", kHeader, frame, parent, state == PoseState::kFinal);
 }
 
+std::string text_of(const TrajectoryComments& comments) {
+  std::string out = trajectory_header(comments.frame, comments.state, comments.parent);
+  if (comments.scale != "metric") out += "\n# " + scale_comment(comments.scale);
+  if (comments.image_stamps) out += "\n# " + image_stamp_comment();
+  return out;
+}
+
 }  // namespace bslam::evaluation

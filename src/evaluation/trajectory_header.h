@@ -41,5 +41,7 @@ struct TrajectoryComments {
 };
 // A file that cannot be read has none.
 TrajectoryComments read_comments(const std::filesystem::path& file);
+// The lines that read_comments() reads, without the first # and the last line break.
+std::string text_of(const TrajectoryComments& comments);
 
 }  // namespace bslam::evaluation

@@ -172,6 +172,7 @@ TEST_F(TrajectoryFile, CommentsAreReadAsTheyAreWritten) {
     EXPECT_EQ(comments.state, PoseState::kLive);
     EXPECT_EQ(comments.scale, "up-to-scale");
     EXPECT_TRUE(comments.image_stamps);
+    EXPECT_EQ("# " + text_of(comments) + "\n", header);
   }
   for (const char* text : {"", "# frame=left", "# my notes: scale=3\n1.5 1 2 3 0 0 0 1\n"}) {
     const TrajectoryComments none = read_comments(write("t", text));
