@@ -18,7 +18,7 @@ Result<RigSource> read_rig_source(const dataset::DatasetRequest& recording) {
     const auto opened = dataset::open_recording(recording);
     if (!opened && !has_rig_file) return opened.error();
     if (opened && opened->format == dataset::DatasetFormat::kBag) {
-      const auto dataset = dataset::open_dataset(recording);
+      const auto dataset = dataset::dataset_of(recording, *opened);
       if (!dataset) return dataset.error();
       const dataset::Recording& source = *opened->recording;
       return RigSource{{dataset->rig, rig_formats::RigFormat::kBslam, {}},
