@@ -23,6 +23,14 @@ namespace bslam {
 
 enum class LogLevel { kInfo, kWarning };
 
+// Whether the images of a run agree with the calibration of its rig.
+enum class CalibrationVerdict {
+  kUnknown,      // not tested, or too few images to tell, or cameras that do not agree with each other at all
+  kConsistent,   // they agree within the noise of the images
+  kInconsistent  // they do not; unless calibration.refine is false, the map uses an estimate, MapView::rig()
+};
+BSLAM_EXPORT std::string_view to_string(CalibrationVerdict verdict);  // "unknown", "consistent", "inconsistent"
+
 struct KeyframeEvent {
   int keyframe = -1;  // id in the map
   FrameResult frame;  // result of the frame that became the keyframe; it may be older than the last processed frame
@@ -95,8 +103,12 @@ class BSLAM_EXPORT System {
   Result<FrameResult> process(const ImageBundle& images);
 
   // Waits for background work and, unless `final_adjustment` is off, adjusts the whole map. Must be called once, after
-  // the last frame. Errors: a second call; an error of a background thread.
+  // the last frame. Compares the images with the calibration, and logs a warning if they contradict it. Errors: a
+  // second call; an error of a background thread.
   Status finish();
+
+  // The verdict on the calibration; kUnknown before finish(), which logs how the estimate differs from it.
+  CalibrationVerdict calibration_verdict() const;
 
   // Makes the current call and finish() return soon. Background work is stopped and its results are discarded from then
   // on: process() continues to track and to add keyframes, but no new landmarks are triangulated from several

@@ -52,6 +52,18 @@ std::string_view to_string(DropReason reason) {
   return "";
 }
 
+std::string_view to_string(CalibrationVerdict verdict) {
+  switch (verdict) {
+    case CalibrationVerdict::kUnknown:
+      return "unknown";
+    case CalibrationVerdict::kConsistent:
+      return "consistent";
+    case CalibrationVerdict::kInconsistent:
+      return "inconsistent";
+  }
+  return "";
+}
+
 std::string_view version() { return BSLAM_VERSION; }
 
 }  // namespace bslam

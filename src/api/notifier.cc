@@ -110,11 +110,12 @@ Status Notifier::processed(const char* name, const FrameResult& frame, const sys
   return failure_;
 }
 
-Status Notifier::finished(const char* name, const system::System& system) {
+Status Notifier::finished(const char* name, const system::System& system, const CalibrationReport& calibration) {
   begin(name);
   report_created_keyframes(system, FrameId());
   report_map(system);
   report_loops(system);
+  for (const std::string& warning : calibration.warnings) log(LogLevel::kWarning, warning);
   return failure_;
 }
 

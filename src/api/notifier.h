@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "api/calibration_report.h"
 #include "camera/rig.h"
 #include "system/system.h"
 
@@ -23,7 +24,7 @@ class Notifier {
   Status started(const char* name, const Rig& rig, const std::vector<std::string>& of_settings,
                  const std::string& map_warning, bool map_without_words);
   Status processed(const char* name, const FrameResult& frame, const system::System& system);
-  Status finished(const char* name, const system::System& system);
+  Status finished(const char* name, const system::System& system, const CalibrationReport& calibration);
 
  private:
   void report_status(const FrameResult& frame);

@@ -8,6 +8,7 @@
 
 #include "api/access.h"
 #include "api/bundle_reader.h"
+#include "api/calibration_report.h"
 #include "api/config_impl.h"
 #include "api/conversions.h"
 #include "api/frame_conversion.h"
@@ -97,10 +98,11 @@ struct System::Impl {
 
   const camera::Rig rig;
   const std::uint64_t vocabulary;
-  const std::string map_warning;
+  std::string map_warning;  // reason why the poses of the map cannot be relied on; may be empty
   system::System system;
   api::BundleReader reader;
   api::Notifier notifier;
+  api::CalibrationReport calibration;  // of finish()
   bool finished = false;
   std::optional<Error> failure;  // the error that ended the run
   mutable std::atomic<bool> call_in_progress = false;
@@ -139,6 +141,8 @@ Status System::Impl::finish() {
   finished = true;
   const Status done = api::guarded("System::finish", [&]() -> Status {
     system.finish();
+    calibration = api::report_calibration(system, rig);
+    if (map_warning.empty()) map_warning = calibration.doubt;
     return {};
   });
   if (!done) {
@@ -146,7 +150,7 @@ Status System::Impl::finish() {
     return done;
   }
   constexpr const char* kName = "System::finish: a callback";
-  return api::guarded(kName, [&] { return notifier.finished(kName, system); });
+  return api::guarded(kName, [&] { return notifier.finished(kName, system, calibration); });
 }
 
 Result<std::vector<Trajectory>> System::Impl::trajectories(RigFrame frame) const {
@@ -189,6 +193,10 @@ Status System::finish() {
   if (!impl_) return moved_from("System::finish");
   const Turn turn(impl_->call_in_progress);
   return turn ? impl_->finish() : out_of_turn("System::finish");
+}
+
+CalibrationVerdict System::calibration_verdict() const {
+  return impl_ ? impl_->calibration.verdict : CalibrationVerdict::kUnknown;
 }
 
 void System::interrupt() {

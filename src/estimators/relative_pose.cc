@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <exception>
 #include <limits>
 #include <numeric>
 #include <opengv/relative_pose/CentralRelativeAdapter.hpp>
@@ -57,6 +58,15 @@ std::array<std::size_t, kSampleSize> draw(std::size_t count, Random& random) {
   return out;
 }
 
+// OpenGV throws for degenerate samples, such as points that have not moved.
+opengv::essentials_t essential_matrices(const opengv::relative_pose::CentralRelativeAdapter& adapter) {
+  try {
+    return opengv::relative_pose::fivept_nister(adapter);
+  } catch (const std::exception&) {
+    return {};
+  }
+}
+
 // Poses of the five-point algorithm that have all five points in front of both cameras. OpenGV's viewpoint 1 is our b
 // and its viewpoint 2 our a, for its E = [t]x R maps from 2 to 1.
 void solve_sample(std::span<const BearingPair> pairs, const std::array<std::size_t, kSampleSize>& sample,
@@ -68,7 +78,7 @@ void solve_sample(std::span<const BearingPair> pairs, const std::array<std::size
   }
   const opengv::relative_pose::CentralRelativeAdapter adapter(b, a);
   out.clear();
-  for (const auto& E : opengv::relative_pose::fivept_nister(adapter)) {
+  for (const auto& E : essential_matrices(adapter)) {
     if (!E.allFinite()) continue;
     for (const EpipolarPose& pose : decompose(E)) {
       const bool in_front =
@@ -158,20 +168,26 @@ RelativePose describe(const EpipolarPose& pose, std::span<const BearingPair> pai
   return out;
 }
 
-}  // namespace
-
-std::vector<BearingPair> bearing_pairs(std::span<const PixelPair> pixels, const camera::Camera& of_a,
-                                       const camera::Camera& of_b) {
-  std::vector<BearingPair> out;
-  for (const PixelPair& pair : pixels) {
-    const auto a = of_a.unproject(pair.a), b = of_b.unproject(pair.b);
-    if (a && b) out.push_back({*a, *b});
+// The pairs that have moved, if these show much motion. The others may be on a part of the robot, or a reflection in
+// it: they agree with every translation without a rotation, and would make it ambiguous. Without much motion, or if
+// nothing stands still, all pairs.
+std::vector<std::size_t> moving_pairs(std::span<const BearingPair> pairs, const RelativePoseOptions& options) {
+  constexpr double kUnmoved = 0.5;  // of the inlier angle
+  std::vector<std::size_t> all(pairs.size()), moving;
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  std::vector<double> angles;
+  for (const std::size_t i : all) {
+    const double angle = geometry::angle_between(pairs[i].a, pairs[i].b);
+    if (angle < kUnmoved * options.inlier_angle) continue;
+    moving.push_back(i);
+    angles.push_back(angle);
   }
-  return out;
+  return angles.empty() || median(std::move(angles)) < options.min_parallax ? all : moving;
 }
 
-std::optional<RelativePose> relative_pose(std::span<const BearingPair> pairs, const RelativePoseOptions& options,
-                                          Random random) {
+// relative_pose() with all pairs.
+std::optional<RelativePose> pose_of_all(std::span<const BearingPair> pairs, const RelativePoseOptions& options,
+                                        Random random) {
   if (pairs.size() < std::max<std::size_t>(kSampleSize, static_cast<std::size_t>(std::max(0, options.min_inliers)))) {
     return std::nullopt;
   }
@@ -190,6 +206,36 @@ std::optional<RelativePose> relative_pose(std::span<const BearingPair> pairs, co
            count(inliers(c.pose, pairs, options.inlier_angle)) >= kAmbiguousInlierRatio * out.num_inliers;
   });
   if (ambiguous) return std::nullopt;
+  return out;
+}
+
+}  // namespace
+
+std::vector<BearingPair> bearing_pairs(std::span<const PixelPair> pixels, const camera::Camera& of_a,
+                                       const camera::Camera& of_b) {
+  std::vector<BearingPair> out;
+  for (const PixelPair& pair : pixels) {
+    const auto a = of_a.unproject(pair.a), b = of_b.unproject(pair.b);
+    if (a && b) out.push_back({*a, *b});
+  }
+  return out;
+}
+
+std::optional<RelativePose> relative_pose(std::span<const BearingPair> pairs, const RelativePoseOptions& options,
+                                          Random random) {
+  const std::vector<std::size_t> moving = moving_pairs(pairs, options);
+  if (moving.size() == pairs.size()) return pose_of_all(pairs, options, random);
+  std::vector<BearingPair> chosen;
+  for (const std::size_t i : moving) chosen.push_back(pairs[i]);
+  auto pose = pose_of_all(chosen, options, random);
+  if (!pose) return std::nullopt;
+  RelativePose out = *pose;
+  out.inlier.assign(pairs.size(), 0);
+  out.points_a.assign(pairs.size(), Vector3d::Zero());
+  for (std::size_t k = 0; k < moving.size(); ++k) {
+    out.inlier[moving[k]] = pose->inlier[k];
+    out.points_a[moving[k]] = pose->points_a[k];
+  }
   return out;
 }
 

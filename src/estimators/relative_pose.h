@@ -40,7 +40,8 @@ struct RelativePose {
 };
 
 // Five-point algorithm (Nister, PAMI 2004, by OpenGV) in a seeded RANSAC, refined over all inliers; points behind a
-// camera are outliers. Returns nullopt if there are too few inliers or too little parallax, or if the solution is
+// camera are outliers, and so are points that have not moved if the others clearly have: they are on a part of the
+// robot. Returns nullopt if there are too few inliers or too little parallax, or if the solution is
 // ambiguous.
 std::optional<RelativePose> relative_pose(std::span<const BearingPair> pairs, const RelativePoseOptions& options,
                                           Random random);

@@ -1,0 +1,19 @@
+// Warnings about an estimated calibration that differs from the given one.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "calibration/rig_refinement.h"
+
+namespace bslam::calibration {
+
+// One line for each camera and each of: focal lengths or principal points that differ by much, a focal length or a
+// distortion that differs by more than errors of calibrations do, and images that contradict the times of the camera.
+// `rig`: the given calibration of the estimate's cameras. All but the times only if the images contradict it.
+std::vector<std::string> deviation_warnings(const camera::Rig& rig, const RigRefinement& estimate);
+
+// Says by how much the images contradict the calibration.
+std::string contradiction_text(const RigRefinement& estimate);
+
+}  // namespace bslam::calibration
