@@ -51,6 +51,11 @@ void apply(const Fault& fault, const Shot* last, Shot& shot) {
   }
 }
 
+// When a row of a rolling shutter is exposed, after the middle row.
+double row_delay_s(const camera::Camera& camera, std::size_t y) {
+  return camera.readout_s * (static_cast<double>(y) / std::max(1, camera.height - 1) - 0.5);
+}
+
 }  // namespace
 
 TimeNs frame_stamp(const RecordingOptions& options, std::size_t frame) {
@@ -89,12 +94,16 @@ Recorder::Recorder(const World& world, camera::Rig rig, synthetic::Trajectory tr
 }
 
 image::Image Recorder::render(const Shot& shot) const {
-  ExposurePoses poses;
-  for (std::size_t k = 0; k < poses.size(); ++k) {
-    const double fraction = (static_cast<double>(k) + 0.5) / static_cast<double>(poses.size()) - 0.5;
-    poses[k] = T_world_cam(shot.camera, shot.scene_time_s + fraction * exposure_s_);
+  const camera::Camera& camera = rig_.camera(shot.camera);
+  std::vector<ExposurePoses> of_rows(camera.readout_s == 0 ? 1 : static_cast<std::size_t>(camera.height));
+  for (std::size_t y = 0; y < of_rows.size(); ++y) {
+    const double time_s = shot.scene_time_s + (of_rows.size() > 1 ? row_delay_s(camera, y) : 0.0);
+    for (std::size_t k = 0; k < of_rows[y].size(); ++k) {
+      const double fraction = (static_cast<double>(k) + 0.5) / static_cast<double>(of_rows[y].size()) - 0.5;
+      of_rows[y][k] = T_world_cam(shot.camera, time_s + fraction * exposure_s_);
+    }
   }
-  return renderers_[shot.camera]->render(poses, shot.noise_key, shot.exposure, shot.blur_px);
+  return renderers_[shot.camera]->render(of_rows, shot.noise_key, shot.exposure, shot.blur_px);
 }
 
 }  // namespace bslam::simulator

@@ -51,7 +51,8 @@ class Recorder {
   Recorder(const World& world, camera::Rig rig, synthetic::Trajectory trajectory, const ImagingOptions& imaging,
            double exposure_s, ThreadPool& pool);
 
-  // Renders an image. The result depends on the shot only. May be called from several threads.
+  // Renders an image, with a rolling shutter if the camera has one. The result depends on the shot only. May be called
+  // from several threads.
   image::Image render(const Shot& shot) const;
 
   // Returns T_world_cam of a camera at a time of the trajectory.

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/assert.h"
+
 namespace bslam::simulator {
 namespace {
 
@@ -93,7 +95,7 @@ Renderer::Renderer(const World& world, const camera::Camera& camera, const Imagi
   }
 }
 
-image::Image Renderer::render(const ExposurePoses& T_world_cam, std::uint64_t noise_key, double exposure,
+image::Image Renderer::render(std::span<const ExposurePoses> T_world_cam, std::uint64_t noise_key, double exposure,
                               double blur_px) const {
   image::Image out(width_, height_);  // initialised with 0
   if (exposure <= 0) return out;
@@ -102,7 +104,9 @@ image::Image Renderer::render(const ExposurePoses& T_world_cam, std::uint64_t no
   const auto row = [&](int y) { return std::span(light).subspan(static_cast<std::size_t>(y) * stride, stride); };
   const std::uint64_t noise_seed = mix_bits(options_.seed * 0x9e3779b97f4a7c15ull + mix_bits(noise_key + 1));
   const auto gain = static_cast<float>(options_.gain * exposure / kSubSamples);
-  for (int y = 0; y < height_; ++y) trace_row(y, T_world_cam, row(y));
+  BSLAM_ASSERT(T_world_cam.size() == 1 || T_world_cam.size() == static_cast<std::size_t>(height_), "poses of each row");
+  for (int y = 0; y < height_; ++y)
+    trace_row(y, T_world_cam.size() == 1 ? T_world_cam.front() : T_world_cam[static_cast<std::size_t>(y)], row(y));
   blur(light, width_, height_, padded_width_, blur_px);
   for (int y = 0; y < height_; ++y) develop_row(y, noise_seed, gain, row(y), out);
   return out;

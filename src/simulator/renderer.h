@@ -38,8 +38,8 @@ class Renderer {
 
   // Renders an image with noise drawn from (options.seed, noise_key). `exposure` scales the light (1: normal, 0:
   // black). `blur_px` is the standard deviation of an approximately Gaussian blur. Pixels without a valid bearing are
-  // 0.
-  image::Image render(const ExposurePoses& T_world_cam, std::uint64_t noise_key, double exposure = 1.0,
+  // 0. `T_world_cam`: the poses of all rows, or of a rolling shutter those of each.
+  image::Image render(std::span<const ExposurePoses> T_world_cam, std::uint64_t noise_key, double exposure = 1.0,
                       double blur_px = 0.0) const;
 
  private:

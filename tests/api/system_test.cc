@@ -156,6 +156,40 @@ TEST_F(PublicSystem, TheMapCanBeReadSavedAndContinued) {
   EXPECT_FALSE(System::create(TexturedWall::rig(), pyramid, {.map = file}));
 }
 
+// The camera on the right looks past the wall's squares that the one on the left sees.
+TEST_F(PublicSystem, SaysAtTheEndWhetherTheImagesContradictTheCalibration) {
+  CameraCalibration turned = TexturedWall::calibration(1);
+  turned.T_body_cam.rotation = {0, 0, 0.0131, 0.99991};  // by 1.5 degrees
+  const Rig wrong = Rig::make({TexturedWall::calibration(0), turned}).value();
+  const TemporaryFolder folder;
+  for (const auto& [rig, refine, verdict] : {std::tuple(TexturedWall::rig(), "auto", CalibrationVerdict::kConsistent),
+                                             {wrong, "auto", CalibrationVerdict::kInconsistent},
+                                             {wrong, "false", CalibrationVerdict::kInconsistent}}) {
+    Config config = sequential();
+    ASSERT_TRUE(config.set("calibration.refine", refine));
+    std::vector<std::string> warnings;
+    Startup startup;
+    startup.callbacks.log = [&](LogLevel level, std::string_view line) {
+      if (level == LogLevel::kWarning) warnings.emplace_back(line);
+    };
+    auto system = System::create(rig, config, startup).value();
+    process(system, 0, kFrames);
+    EXPECT_EQ(system.calibration_verdict(), CalibrationVerdict::kUnknown);
+    ASSERT_TRUE(system.finish());
+    EXPECT_EQ(system.calibration_verdict(), verdict) << to_string(system.calibration_verdict());
+    const auto has = [&](const std::string& text) {
+      return std::ranges::any_of(warnings, [&](const std::string& w) { return w.find(text) != std::string::npos; });
+    };
+    const bool wrong_rig = verdict == CalibrationVerdict::kInconsistent, refined = std::string(refine) == "auto";
+    EXPECT_EQ(has("the images contradict the calibration"), wrong_rig);
+    EXPECT_EQ(has("right: estimated extrinsics differ from the calibration by"), wrong_rig);
+    EXPECT_EQ(has("the map uses an estimate of it"), wrong_rig && refined);
+    // A map with the contradicted calibration is not relied on later.
+    ASSERT_TRUE(system.save_map(folder.path() / "a.bmap"));
+    EXPECT_EQ(storage::read_map(folder.path() / "a.bmap")->info.warning.empty(), !wrong_rig || refined);
+  }
+}
+
 // The rig could not be found in the map, and the map would be saved again without its words.
 TEST_F(PublicSystem, DoesNotContinueAMapWithoutPlaceRecognition) {
   const TemporaryFolder folder;

@@ -97,6 +97,33 @@ TEST(Recorder, AgreesWithGroundTruthAcrossCamerasAndTime) {
   }
 }
 
+// Each row is that of the image that a global shutter takes at the time of the row.
+TEST(Recorder, RowsOfARollingShutterAreExposedAtTheirTimes) {
+  constexpr double kReadout_s = 0.06;
+  ThreadPool pool(2);
+  const World world = small_world(1, pool);
+  const camera::Rig global = synthetic::ring_rig(1, 96);
+  camera::RigCamera camera{global.camera(std::size_t{0}), global.body_from_cam(0)};
+  camera.camera.readout_s = kReadout_s;
+  const synthetic::Trajectory tour = make_tour(world.building(), {});
+  const Recorder rolling(world, camera::Rig({camera}), tour, {}, 0.005, pool);
+  const Recorder reference(world, global, tour, {}, 0.005, pool);
+  Shot shot;
+  shot.scene_time_s = 3;
+  const image::Image image = rolling.render(shot), middle = reference.render(shot);
+  int different = 0;
+  for (const int y : {0, image.height() / 3, image.height() - 1}) {
+    Shot of_row = shot;
+    of_row.scene_time_s += kReadout_s * (y / (image.height() - 1.0) - 0.5);
+    const image::Image expected = reference.render(of_row);
+    for (int x = 0; x < image.width(); ++x) {
+      ASSERT_EQ(image.row(y)[x], expected.row(y)[x]) << x << " " << y;
+      different += image.row(y)[x] != middle.row(y)[x];
+    }
+  }
+  EXPECT_GT(different, image.width());
+}
+
 TEST(Recorder, HasReasonableExposure) {
   ThreadPool pool(2);
   const World world = small_world(1, pool);

@@ -61,7 +61,7 @@ TEST(Renderer, RendersAPointAtItsProjection) {
       const Renderer renderer(world, camera, kIdeal);
       ExposurePoses still;
       still.fill(SE3());
-      const Spot spot = find_spot(renderer.render(still, 0));
+      const Spot spot = find_spot(renderer.render({&still, 1}, 0));
       EXPECT_NEAR(spot.centre.x(), pixel.x(), 0.06) << camera.name;
       EXPECT_NEAR(spot.centre.y(), pixel.y(), 0.06) << camera.name;
     }
@@ -80,7 +80,7 @@ TEST(Renderer, BlursAroundTheMiddleOfTheExposure) {
     const double yaw = ((static_cast<double>(k) + 0.5) / 4 - 0.5) * 4 / 230;
     rotating[k] = SE3(geometry::so3_exp({0, yaw, 0}), Vector3d::Zero());
   }
-  const Spot sharp = find_spot(renderer.render(still, 0)), blurred = find_spot(renderer.render(rotating, 0));
+  const Spot sharp = find_spot(renderer.render({&still, 1}, 0)), blurred = find_spot(renderer.render({&rotating, 1}, 0));
   EXPECT_NEAR((blurred.centre - sharp.centre).norm(), 0.0, 0.06);
   EXPECT_GT(blurred.spread.x(), sharp.spread.x() + 0.2);
   EXPECT_NEAR(blurred.spread.y(), sharp.spread.y(), 0.1);
@@ -95,7 +95,7 @@ TEST(Renderer, RendersPixelsWithoutBearingBlack) {
   still.fill(SE3());
   ImagingOptions noisy;
   noisy.noise = 5;
-  const image::Image picture = Renderer(world, camera, noisy).render(still, 0);
+  const image::Image picture = Renderer(world, camera, noisy).render({&still, 1}, 0);
   int outside = 0;
   for (int y = 0; y < camera.height; ++y) {
     for (int x = 0; x < camera.width; ++x) {
@@ -117,7 +117,7 @@ TEST(Renderer, NoiseHasTheSpecifiedDeviation) {
   ExposurePoses still;
   still.fill(SE3());
   const Renderer renderer(world, camera, options);
-  const image::Image a = renderer.render(still, 7), b = renderer.render(still, 8);
+  const image::Image a = renderer.render({&still, 1}, 7), b = renderer.render({&still, 1}, 8);
   double sum = 0, squares = 0, products = 0;
   const int count = camera.width * camera.height;
   double sum_b = 0;
