@@ -1,4 +1,5 @@
 import gc
+import json
 import subprocess
 import sys
 import threading
@@ -19,6 +20,12 @@ def test_trajectory_equals_that_of_bslam_run_byte_for_byte(finished, program_run
     finished[0].save_trajectory(tmp_path / "t.tum")
     assert (tmp_path / "t.tum").read_bytes() == (program_run / "run/trajectory.tum").read_bytes()
     np.testing.assert_allclose(finished[0].trajectory(), np.loadtxt(tmp_path / "t.tum"), atol=1e-9, rtol=0)
+
+
+def test_the_verdict_on_the_calibration_is_that_of_bslam_run(finished, program_run, system):
+    summary = json.loads((program_run / "run/summary.json").read_text())
+    assert finished[0].calibration_verdict == summary["calibration"]["verdict"]
+    assert system.calibration_verdict == "unknown"
 
 
 def test_a_saved_trajectory_replaces_an_earlier_one_and_no_other_file(finished, tmp_path):

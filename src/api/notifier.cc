@@ -36,6 +36,19 @@ Status Notifier::started(const char* name, const Rig& rig, const std::vector<std
   return failure_;
 }
 
+// Warns once of stamps that cannot be nanoseconds.
+void Notifier::report_rate(const FrameResult& frame) {
+  constexpr std::size_t kFrames = 20;
+  constexpr double kMostFrames_hz = 2000;
+  if (first_times_ns_.size() >= kFrames) return;
+  first_times_ns_.push_back(frame.time_ns);
+  const double interval_s = to_seconds(frame.time_ns - first_times_ns_.front()) / (kFrames - 1);
+  if (first_times_ns_.size() < kFrames || interval_s * kMostFrames_hz >= 1) return;
+  log(LogLevel::kWarning, fmt::format("{:.0f} frames per second according to their times, which are in nanoseconds: "
+                                      "check their unit",
+                                      1 / interval_s));
+}
+
 void Notifier::report_status(const FrameResult& frame) {
   if (frame.status == status_) return;
   const double time_s = to_seconds(frame.time_ns);
@@ -101,6 +114,7 @@ void Notifier::report_created_keyframes(const system::System& system, FrameId re
 
 Status Notifier::processed(const char* name, const FrameResult& frame, const system::System& system) {
   begin(name);
+  report_rate(frame);
   report_status(frame);
   report_withdrawal(frame);
   report_cameras(frame);

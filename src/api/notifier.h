@@ -27,6 +27,7 @@ class Notifier {
   Status finished(const char* name, const system::System& system, const CalibrationReport& calibration);
 
  private:
+  void report_rate(const FrameResult& frame);
   void report_status(const FrameResult& frame);
   void report_withdrawal(const FrameResult& frame);
   void report_cameras(const FrameResult& frame);
@@ -40,8 +41,9 @@ class Notifier {
 
   const Callbacks callbacks_;
   const camera::Rig rig_;
-  const char* name_ = "";  // of the call in progress, for errors
-  Status failure_;         // the first one of that call
+  const char* name_ = "";                     // of the call in progress, for errors
+  Status failure_;                            // the first one of that call
+  std::vector<std::int64_t> first_times_ns_;  // of the first frames, until their rate was checked
   TrackingStatus status_ = TrackingStatus::kNotStarted;
   std::vector<CameraResult> cameras_;  // last reported states; empty before the first frame
   int map_version_ = 0;

@@ -75,6 +75,9 @@ std::string remark(const SequenceResult& result) {
   if (std::ranges::any_of(result.runs, &RunMeasurement::body_is_camera))
     return "the calibration gives camera 0 no pose on the body other than the identity: the body is taken to be camera "
            "0";
+  if (const auto contradicted = std::ranges::count_if(result.runs, &RunMeasurement::contradicted); contradicted > 0)
+    return fmt::format("the images contradict the calibration in {} of {} runs; see their log.txt", contradicted,
+                       result.runs.size());
   return "";
 }
 

@@ -23,6 +23,7 @@ struct RunMeasurement {
   std::string truth_problem = {};           // why there are no errors although there is ground truth
   // The calibration gives camera 0 no pose on the body, so that its path is compared with the poses of the body.
   bool body_is_camera = false;
+  bool contradicted = false;  // the images contradict the calibration
   int frames = 0, frames_with_pose = 0, submaps = 0, loops = 0;
   std::optional<double> frame_ms_median = {}, frame_ms_p95 = {}, peak_mb = {};
 };

@@ -156,6 +156,25 @@ TEST_F(PublicSystem, TheMapCanBeReadSavedAndContinued) {
   EXPECT_FALSE(System::create(TexturedWall::rig(), pyramid, {.map = file}));
 }
 
+TEST_F(PublicSystem, WarnsOnceOfTimesThatAreNotNanoseconds) {
+  for (const std::int64_t unit : {1, 1000}) {
+    std::vector<std::string> warnings;
+    Startup startup;
+    startup.callbacks.log = [&](LogLevel, std::string_view line) {
+      if (line.find("check their unit") != std::string_view::npos) warnings.emplace_back(line);
+    };
+    auto system = System::create(TexturedWall::rig(), sequential(), startup).value();
+    for (int k = 0; k < 30; ++k) {
+      ImageBundle bundle = wall_.bundle(k);
+      for (CameraImage& image : bundle.images) image.time_ns /= unit;
+      ASSERT_TRUE(system.process(bundle));
+    }
+    ASSERT_EQ(warnings.size(), unit == 1 ? 0u : 1u);
+    if (unit == 1) continue;
+    EXPECT_EQ(warnings[0].find("20000 frames per second according to their times"), 0u);
+  }
+}
+
 // The camera on the right looks past the wall's squares that the one on the left sees.
 TEST_F(PublicSystem, SaysAtTheEndWhetherTheImagesContradictTheCalibration) {
   CameraCalibration turned = TexturedWall::calibration(1);

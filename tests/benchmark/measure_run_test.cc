@@ -110,6 +110,19 @@ TEST_F(MeasureRun, ACalibrationWithoutABodyIsRemarked) {
   EXPECT_EQ(remark(of_camera, {}), "");
 }
 
+TEST_F(MeasureRun, AContradictedCalibrationIsRemarked) {
+  const auto remark = [&](const std::string& verdict) {
+    support::write_text(folder_.path() / "summary.json",
+                        R"({"frames": {"input": 110, "tracked": 100}, "calibration": )" + verdict + "}");
+    const auto run = measure_run(folder_.path(), with_body_truth(), body_from_camera_);
+    return benchmark_report({{with_body_truth(), {run.value()}}}, {}).tables[0].rows[0].back();
+  };
+  EXPECT_EQ(remark(R"({"verdict": "inconsistent"})"),
+            "the images contradict the calibration in 1 of 1 runs; see their log.txt");
+  for (const char* other : {R"({"verdict": "consistent"})", R"({"verdict": null})", "{}", "3"})
+    EXPECT_EQ(remark(other), "") << other;
+}
+
 TEST_F(MeasureRun, AnUnreadableTruthIsReportedBesideTheCoverage) {
   support::write_text(folder_.path() / "truth.csv", "no trajectory");
   const auto m = measure_run(folder_.path(), with_body_truth(), body_from_camera_);

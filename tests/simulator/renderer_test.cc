@@ -80,7 +80,8 @@ TEST(Renderer, BlursAroundTheMiddleOfTheExposure) {
     const double yaw = ((static_cast<double>(k) + 0.5) / 4 - 0.5) * 4 / 230;
     rotating[k] = SE3(geometry::so3_exp({0, yaw, 0}), Vector3d::Zero());
   }
-  const Spot sharp = find_spot(renderer.render({&still, 1}, 0)), blurred = find_spot(renderer.render({&rotating, 1}, 0));
+  const Spot sharp = find_spot(renderer.render({&still, 1}, 0)),
+             blurred = find_spot(renderer.render({&rotating, 1}, 0));
   EXPECT_NEAR((blurred.centre - sharp.centre).norm(), 0.0, 0.06);
   EXPECT_GT(blurred.spread.x(), sharp.spread.x() + 0.2);
   EXPECT_NEAR(blurred.spread.y(), sharp.spread.y(), 0.1);
