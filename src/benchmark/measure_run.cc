@@ -78,7 +78,8 @@ Result<RunMeasurement> measure_run(const std::filesystem::path& folder, const Se
   m.frame_ms_median = number(summary, "/time/frame_ms/median");
   m.frame_ms_p95 = number(summary, "/time/frame_ms/p95");
   m.peak_mb = number(summary, "/memory/peak_mb");
-  m.contradicted = summary.value(json::json_pointer("/calibration/verdict"), std::string()) == "inconsistent";
+  const json::json_pointer verdict("/calibration/verdict");
+  m.contradicted = summary.contains(verdict) && summary.at(verdict) == "inconsistent";
   if (m.frames_with_pose > 0 && (sequence.released || sequence.corrected)) {
     if (const Status s = compare(folder, sequence, body_from_camera.inverse(), m); !s) {
       m.truth_problem = s.error().message();

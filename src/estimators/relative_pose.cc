@@ -223,8 +223,8 @@ std::vector<BearingPair> bearing_pairs(std::span<const PixelPair> pixels, const 
 
 std::optional<RelativePose> relative_pose(std::span<const BearingPair> pairs, const RelativePoseOptions& options,
                                           Random random) {
+  if (!options.leave_out_unmoved) return pose_of_all(pairs, options, random);
   const std::vector<std::size_t> moving = moving_pairs(pairs, options);
-  if (moving.size() == pairs.size()) return pose_of_all(pairs, options, random);
   std::vector<BearingPair> chosen;
   for (const std::size_t i : moving) chosen.push_back(pairs[i]);
   auto pose = pose_of_all(chosen, options, random);

@@ -29,6 +29,9 @@ struct RelativePoseOptions {
   double inlier_angle = 2e-3;  // rad, maximum angle between a bearing and the epipolar plane of the other
   double min_parallax = 0.02;  // rad, minimum median angle between the rays of the inliers
   int min_inliers = 50;
+  // Points that have not moved are outliers if the others clearly have: for two images of a moving camera, in which a
+  // part of the robot can be seen.
+  bool leave_out_unmoved = false;
 };
 
 struct RelativePose {
@@ -40,8 +43,7 @@ struct RelativePose {
 };
 
 // Five-point algorithm (Nister, PAMI 2004, by OpenGV) in a seeded RANSAC, refined over all inliers; points behind a
-// camera are outliers, and so are points that have not moved if the others clearly have: they are on a part of the
-// robot. Returns nullopt if there are too few inliers or too little parallax, or if the solution is
+// camera are outliers. Returns nullopt if there are too few inliers or too little parallax, or if the solution is
 // ambiguous.
 std::optional<RelativePose> relative_pose(std::span<const BearingPair> pairs, const RelativePoseOptions& options,
                                           Random random);

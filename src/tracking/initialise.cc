@@ -55,7 +55,7 @@ std::optional<TwoView> best_two_view(const FramePairs& pairs, const camera::Rig&
   for (std::size_t c = 0; c < pairs.keypoints.size(); ++c) {
     TwoView view{c, pairs.keypoints[c], {}};
     if (view.pairs.size() < static_cast<std::size_t>(options.min_monocular)) continue;
-    estimators::RelativePoseOptions two_views{.min_inliers = kMinInliers};
+    estimators::RelativePoseOptions two_views{.min_inliers = kMinInliers, .leave_out_unmoved = true};
     two_views.inlier_angle = std::max(two_views.inlier_angle, kNoise_px * rig.camera(c).radians_per_pixel());
     const auto pose = estimators::relative_pose(pairs.bearings[c], two_views, Random(seed, "two views", c));
     if (!pose || pose->num_inliers < options.min_monocular_points) continue;
