@@ -232,7 +232,7 @@ void bind_system(nb::module_& module) {
       .def_prop_ro(
           "calibration_verdict", [](PythonSystem& s) { return std::string(to_string((*s).calibration_verdict())); },
           "Whether the images agree with the calibration: unknown, consistent or inconsistent; unknown before\n"
-          "finish(), which tells the callback `log` how the estimate differs from the calibration.")
+          "finish(), which tells on_log how the estimate differs from the calibration.")
       .def(
           "map", [](PythonSystem& s) { return (*s).map(); }, "Returns the current version of the map.")
       .def("save_map", save_map, nb::arg("path"),
