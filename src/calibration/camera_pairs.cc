@@ -1,5 +1,7 @@
 #include "calibration/camera_pairs.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -129,6 +131,14 @@ bool CameraPair::hardly_matched() const {
   return overlap >= kMuchOverlap && keyframes >= kMinKeyframes && matched_share() < kHardlyAny;
 }
 
+std::string describe_hardly_matched(const CameraPair& pair, const std::string& first, const std::string& second) {
+  return fmt::format(
+      "the calibrated views of cameras {} and {} overlap by {:.0f} %, but only {:.1f} % of the features there are "
+      "matched between them, and it cannot be told why: check which images are of which camera, their time stamps, "
+      "and the extrinsics",
+      first, second, 100 * pair.overlap, 100 * pair.matched_share());
+}
+
 bool shows_another_arrangement(const PairEvidence& evidence) {
   const bool mistaken = evidence.verdict && *evidence.verdict != Convention::kAsGiven;
   const bool elsewhere = evidence.other && evidence.other->is_another_arrangement();
@@ -172,6 +182,15 @@ std::vector<CameraPair> test_pairs(const map::BundledMap& map, std::span<const K
     pair.contradicted =
         mistaken || (!was_matched && shows_another_arrangement(*pair.evidence) && !explained_by(refined));
   }
+  return pairs;
+}
+
+std::vector<CameraPair> disagreeing_pairs(const map::BundledMap& map, KeyframeId first, std::size_t first_camera,
+                                          const camera::Rig& given, const camera::Rig& final_rig, bool suspected) {
+  std::vector<KeyframeId> keyframes = map.keyframe_ids();
+  std::erase_if(keyframes, [&](KeyframeId k) { return k < first; });
+  std::vector<CameraPair> pairs = test_pairs(map, keyframes, first_camera, given, final_rig, suspected);
+  std::erase_if(pairs, [](const CameraPair& pair) { return !pair.contradicted && !pair.hardly_matched(); });
   return pairs;
 }
 

@@ -5,6 +5,7 @@
 
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "calibration/convention_check.h"
@@ -35,6 +36,9 @@ struct CameraPair {
   bool hardly_matched() const;
 };
 
+// Describes a pair that is hardly matched, whose cameras have these names.
+std::string describe_hardly_matched(const CameraPair& pair, const std::string& first, const std::string& second);
+
 // Whether the evidence shows that the images do not belong to the calibration, rather than a calibration that is
 // inaccurate or a camera that was bumped: nearly all matches are consistent with exchanged cameras, with inverted
 // transforms, or with a pose of the second camera that has nothing to do with the calibrated one.
@@ -48,5 +52,10 @@ bool shows_another_arrangement(const PairEvidence& evidence);
 std::vector<CameraPair> test_pairs(const map::BundledMap& map, std::span<const KeyframeId> keyframes,
                                    std::size_t first_camera, const camera::Rig& given, const camera::Rig& final_rig,
                                    bool suspected = false);
+
+// The pairs that are contradicted or hardly matched, by all keyframes from `first` on: those of this run. Otherwise as
+// test_pairs().
+std::vector<CameraPair> disagreeing_pairs(const map::BundledMap& map, KeyframeId first, std::size_t first_camera,
+                                          const camera::Rig& given, const camera::Rig& final_rig, bool suspected);
 
 }  // namespace bslam::calibration

@@ -105,6 +105,11 @@ std::vector<std::string> deviation_warnings(const camera::Rig& rig, const RigRef
   return warnings;
 }
 
+std::string extrinsics_text(const std::string& camera, double change_deg, double change_mm) {
+  return fmt::format("{}: estimated extrinsics differ from the calibration by {:.2f} deg and {:.1f} mm", camera,
+                     change_deg, change_mm);
+}
+
 std::string contradiction_text(const RigRefinement& estimate) {
   return fmt::format(
       "the images contradict the calibration, which multiplies their squared reprojection error by {:.1f}",

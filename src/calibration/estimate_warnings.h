@@ -13,6 +13,9 @@ namespace bslam::calibration {
 // `rig`: the given calibration of the estimate's cameras. All but the times only if the images contradict it.
 std::vector<std::string> deviation_warnings(const camera::Rig& rig, const RigRefinement& estimate);
 
+// Says by how much the estimated extrinsics of a camera differ.
+std::string extrinsics_text(const std::string& camera, double change_deg, double change_mm);
+
 // Says by how much the images contradict the calibration.
 std::string contradiction_text(const RigRefinement& estimate);
 

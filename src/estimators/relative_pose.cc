@@ -227,7 +227,7 @@ std::optional<RelativePose> relative_pose(std::span<const BearingPair> pairs, co
   const std::vector<std::size_t> moving = moving_pairs(pairs, options);
   std::vector<BearingPair> chosen;
   for (const std::size_t i : moving) chosen.push_back(pairs[i]);
-  auto pose = pose_of_all(chosen, options, random);
+  const auto pose = pose_of_all(chosen, options, random);
   if (!pose) return std::nullopt;
   RelativePose out = *pose;
   out.inlier.assign(pairs.size(), 0);

@@ -12,8 +12,7 @@ namespace {
 void warn_of_extrinsics(const CameraRecord& camera, bool advise, Warnings& warnings) {
   const auto& e = camera.extrinsics;
   if (!e || !e->suspect) return;
-  warn(warnings, "{}: estimated extrinsics differ from the calibration by {:.2f} deg and {:.1f} mm{}", camera.name,
-       e->change_deg, e->change_mm,
+  warn(warnings, "{}{}", calibration::extrinsics_text(camera.name, e->change_deg, e->change_mm),
        advise && !e->refined ? "; use the estimate with --set calibration.refine=true" : "");
 }
 

@@ -100,14 +100,10 @@ void add_calibration(const RecordInput& input, RunRecord& record) {
   calibration.moves_in_map = !input.system.rig().moves().empty();
   for (const calibration::MoveEstimate& m : calibration.estimate.moves)
     calibration.moves.push_back({m.camera, seconds(input, m.time_ns), m.change_deg, m.std_deg, m.change_mm, m.std_mm});
-  const map::MapSnapshot map = input.system.snapshot();
-  std::vector<KeyframeId> keyframes = map->keyframe_ids();
-  std::erase_if(keyframes, [&](KeyframeId k) { return k < input.system.first_keyframe(); });
   const bool suspected = calibration.estimate.verdict == calibration::Verdict::kInconsistent;
-  calibration.pairs = calibration::test_pairs(*map, keyframes, input.system.first_camera(), input.dataset.rig,
-                                              input.system.rig(), suspected);
-  std::erase_if(calibration.pairs,
-                [](const calibration::CameraPair& p) { return !p.contradicted && !p.hardly_matched(); });
+  calibration.pairs =
+      calibration::disagreeing_pairs(*input.system.snapshot(), input.system.first_keyframe(),
+                                     input.system.first_camera(), input.dataset.rig, input.system.rig(), suspected);
   if (input.complete && (never_started(record) || mostly_lost(record))) {
     PairsWithoutMap found = pairs_without_map(input.dataset);
     if (!found.contradicted.empty()) calibration.pairs = std::move(found.contradicted);

@@ -141,12 +141,9 @@ void warn_of_pairs(const RunRecord& record, const std::string& check_command, Wa
          check_command);
   }
   for (const calibration::CameraPair& pair : record.calibration.pairs) {
-    warn(warnings,
-         "the calibrated views of cameras {} and {} overlap by {:.0f} %, but only {:.1f} % of the features there are "
-         "matched between them, and it cannot be told why: check which images are of which camera, their time stamps, "
-         "and the extrinsics ({})",
-         record.cameras[pair.first].name, record.cameras[pair.second].name, 100 * pair.overlap,
-         100 * pair.matched_share(), check_command);
+    warn(warnings, "{} ({})",
+         calibration::describe_hardly_matched(pair, record.cameras[pair.first].name, record.cameras[pair.second].name),
+         check_command);
   }
 }
 
