@@ -52,7 +52,8 @@ void keep_scale(const CalibrationOptions& options, RigRefinement& refinement) {
   const double factor = 1 / refinement.scale_change;
   const double tolerance =
       std::max(0.01 * options.scale_tolerance_percent, std::min(refinement.scale_deviation, kMaxDeviation));
-  if (!(std::abs(std::log(factor)) < tolerance)) return;
+  const bool arbitrary = refinement.rig->size() == 1;
+  if (!arbitrary && !(std::abs(std::log(factor)) < tolerance)) return;
   solver::RigValues values = solver::RigValues::of(refinement.rig->in_frame_of_camera_0());
   for (geometry::SE3& T : values.T_cam_rig) T = geometry::scaled(T, factor);
   std::vector<camera::CameraMove> moves(refinement.rig->moves().begin(), refinement.rig->moves().end());

@@ -79,9 +79,9 @@ std::string_view verdict_name(Verdict verdict) {
 
 namespace {
 
-// Without metric scale, calibration errors in millimetres have no meaning in the map.
+// Without metric scale, errors of extrinsics in millimetres have no meaning in the map. A single camera has none.
 bool can_refine(const map::BundledMap& map) {
-  return map.rig().size() >= 2 && map.num_keyframes() > 0 && map.scale() == map::Scale::kMetric;
+  return map.num_keyframes() > 0 && (map.rig().size() == 1 || map.scale() == map::Scale::kMetric);
 }
 
 MovedCameras moves_of_map(const map::BundledMap& map) {
@@ -169,7 +169,8 @@ bool replaced(const camera::Rig& of_map, const camera::Rig& calibrated) {
   for (std::size_t c = 1; c < calibrated.size(); ++c) {
     if (of_map.body_from_cam(c).matrix() != calibrated.body_from_cam(c).matrix()) return true;
   }
-  return false;
+  return calibrated.size() == 1 &&
+         camera::parameters(of_map.camera(0).model) != camera::parameters(calibrated.camera(0).model);
 }
 
 std::optional<RigRefinement> refine_if_accepted(const map::BundledMap& map, const camera::Rig& calibrated,

@@ -160,7 +160,7 @@ struct MoveEstimate {
 };
 
 struct RigRefinement {
-  bool done = false;         // false: one camera only, no metric scale, too few observations, stopped or failed
+  bool done = false;         // false: several cameras without metric scale, too few observations, stopped or failed
   bool implausible = false;  // some camera was displaced by much that the images do not constrain; never accepted
   std::vector<CameraRefinement> cameras;     // all cameras in the order of the rig, if done
   std::vector<MoveEstimate> moves;           // in order of time; the extrinsics in `cameras` are those before them
@@ -190,7 +190,8 @@ Eigen::MatrixXd prior_information(const camera::Rig& calibrated, const Calibrati
 
 // Whether the rig of a map is to be replaced by the estimate.
 bool accepted(const RigRefinement& refinement, const CalibrationOptions& options);
-// Whether an earlier estimate has replaced the calibration of a map. An accepted estimate always changes extrinsics.
+// Whether an earlier estimate has replaced the calibration of a map. An accepted estimate always changes extrinsics,
+// and the intrinsics of a single camera.
 bool replaced(const camera::Rig& of_map, const camera::Rig& calibrated);
 // Returns the result of refine_rig if the estimate is to be accepted. If that depends on the verdict, the verdict is
 // determined first from a fraction of the keyframes and landmarks.

@@ -1,4 +1,5 @@
 // bslam rig calibrate: estimates a calibration from recordings, beginning with a rough one.
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -8,11 +9,13 @@
 
 #include "base/atomic_file.h"
 #include "base/output_file.h"
+#include "camera/model_table.h"
 #include "cli/config_arguments.h"
 #include "cli/dataset_arguments.h"
 #include "cli/interruption.h"
 #include "cli/progress_bar.h"
 #include "cli/verbs.h"
+#include "dataset/recording_description.h"
 #include "rig_formats/rig_file.h"
 #include "session/rig_calibration.h"
 #include "storage/vocabulary_file.h"
@@ -45,14 +48,30 @@ Status check_out(const CalibrateArguments& a) {
   return check_output_file(a.out, "--out", a.overwrite, is_calibration ? "" : "bslam_rig:");
 }
 
+// The start for the images of a single camera without a calibration, which needs no rig file: its model is that of the
+// command line, and its resolution that of the images. nullopt for several cameras.
+std::optional<camera::Rig> rig_of_single_camera(const dataset::DatasetRequest& request) {
+  const auto recording = dataset::describe_recording(request);
+  if (!recording) return std::nullopt;
+  const auto in_use = [](const dataset::StreamDescription& stream) { return stream.camera >= 0; };
+  const auto stream = std::ranges::find_if(recording->streams, in_use);
+  if (std::ranges::count_if(recording->streams, in_use) != 1 || stream->width <= 0) return std::nullopt;
+  const double focal = stream->width;  // is replaced
+  const auto model = camera::find_model(camera::Pinhole::kName)->make({focal, focal, 0, 0}, {});
+  const camera::Camera camera{
+      .name = "cam0", .model = model, .width = stream->width, .height = stream->height, .mask_file = {}};
+  return camera::Rig({{camera, geometry::SE3()}});
+}
+
 // All recordings must be of one rig: that of --rig, or the first one's.
 Result<std::vector<dataset::Dataset>> open_recordings(const CalibrateArguments& a, const system::Config& config) {
   std::vector<dataset::Dataset> out;
   for (const std::string& path : a.paths) {
     DatasetArguments one = a.data;
     one.path = path;
-    const auto request = dataset_request(one, config.io.sync_tolerance);
+    auto request = dataset_request(one, config.io.sync_tolerance);
     if (!request) return request.error();
+    if (a.fov_deg && one.rig.empty()) request->rig_of_map = rig_of_single_camera(*request);
     auto opened = dataset::open_dataset(*request);
     if (!opened) return opened.error();
     const camera::Rig& first = out.empty() ? opened->rig : out.front().rig;
@@ -108,7 +127,7 @@ void add_rig_calibrate(CLI::App& rig, int& exit_status) {
   CLI::Option* fov =
       verb->add_option("--fov", a->fov_deg,
                        "begin with this horizontal field of view in degrees, and without distortion; the "
-                       "rig gives resolutions and extrinsics");
+                       "rig gives resolutions and extrinsics, and a single camera needs none");
   model->needs(fov);
   fov->needs(model);
   verb->add_option("--out", a->out, "rig file to write")->required();

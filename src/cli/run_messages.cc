@@ -72,9 +72,9 @@ std::string doubt_text(const session::RunRecord& record) {
 
 // The reason why the calibration could not be tested.
 std::string_view untested_text(const session::RunRecord& record) {
-  if (record.cameras.size() < 2) return "calibration: not tested, which takes several cameras: there is a single one";
   if (!record.complete) return "calibration: not tested, because the run was interrupted";
-  if (record.map.scale != "metric") return "calibration: not tested, which takes a map of metric scale";
+  if (record.cameras.size() > 1 && record.map.scale != "metric")
+    return "calibration: not tested, which takes a map of metric scale";
   return "calibration: not tested, which takes more motion, and landmarks in several keyframes, or "
          "calibration.check is false";
 }

@@ -29,7 +29,8 @@ struct DatasetRequest {
   std::filesystem::path path;
   DatasetFormat format = DatasetFormat::kAuto;
   std::optional<std::filesystem::path> rig_file = {};  // default: the calibration in the data set
-  // Used if there is no other calibration: that of a map of the recording, which has the cameras of the run.
+  // Used if there is no other calibration: that of a map of the recording, which has the cameras of the run, or a
+  // single camera of which only the resolution is known.
   std::optional<camera::Rig> rig_of_map = {};
   // Of bags image topics, of the format kFolder sub-folders, in the order of the cameras; empty: all, by name.
   std::vector<std::string> topics = {};

@@ -148,8 +148,6 @@ Result<RigCalibration> calibrate_rig(std::span<const dataset::Dataset> recording
                                      const RigCalibrationRequest& request) {
   BSLAM_ASSERT(!recordings.empty(), "there must be a recording");
   const camera::Rig& start = recordings.front().rig;
-  if (start.size() < 2)
-    return Error{recordings.front().name, "", "a single camera", "at least two cameras with a rough calibration"};
   std::vector<Passes> all;
   camera::Rig rig = start;
   int runs = 0;

@@ -140,7 +140,7 @@ TEST(RefineRig, FixingSeveralKeyframesDoesNotConstrainTheLength) {
 
 TEST(RefineRig, IsNotDoneIfNotObservable) {
   const camera::Rig one = synthetic::ring_rig(1), two = synthetic::ring_rig(2);
-  EXPECT_FALSE(refine(mapped(one, one, 4, 0.5).map).done);
+  EXPECT_FALSE(refine(map::BundledMap(std::make_shared<const camera::Rig>(one))).done);
   EXPECT_FALSE(refine(map::BundledMap(std::make_shared<const camera::Rig>(two))).done);
   map::SimulatedMap world = mapped(two, two, 4, 0.5);
   EXPECT_TRUE(refine(world.map).done);
@@ -212,6 +212,33 @@ TEST(RefineRig, TellsAWrongCalibrationFromARightOne) {
     const double focal = camera::intrinsics(truth.camera(c).model).fx;
     EXPECT_NEAR(camera::intrinsics(of_wrong.rig->camera(c).model).fx, focal, 0.0015 * focal) << "camera " << c;
   }
+}
+
+// The intrinsics of a single camera do not depend on the scale of its map, which is arbitrary.
+TEST(RefineRig, CalibratesASingleCamera) {
+  const camera::Rig truth = synthetic::ring_rig(1);
+  const camera::Rig wrong({{camera::zoomed(truth.camera(0), 1.03), truth.body_from_cam(0)}});
+  const auto estimate = [&](const camera::Rig& given) {
+    map::SimulatedMap world = mapped(truth, given, 30, 0.3);
+    world.map.set_scale(map::Scale::kUpToScale);
+    return refine(world.map, {.correlated_observations = 1, .inconsistent_excess = 0.01});
+  };
+  const RigRefinement of_right = estimate(truth), of_wrong = estimate(wrong);
+  ASSERT_TRUE(of_right.done && of_wrong.done);
+  EXPECT_EQ(of_right.verdict, Verdict::kConsistent) << of_right.excess_error;
+  EXPECT_EQ(of_wrong.verdict, Verdict::kInconsistent) << of_wrong.excess_error;
+  EXPECT_TRUE(of_wrong.moves.empty());
+  for (const RigRefinement& r : {of_right, of_wrong}) {
+    const camera::ModelParameters error =
+        camera::parameters(r.rig->camera(0).model) - camera::parameters(truth.camera(0).model);
+    for (std::size_t k = 0; k < r.cameras[0].intrinsics.size(); ++k) {
+      const ParameterRefinement& parameter = r.cameras[0].intrinsics[k];
+      EXPECT_LT(std::abs(error(static_cast<Eigen::Index>(k))), 4 * parameter.std) << parameter.name;
+    }
+  }
+  EXPECT_LT(of_wrong.cameras[0].intrinsics[0].std, 0.005 * camera::intrinsics(truth.camera(0).model).fx);
+  EXPECT_TRUE(replaced(*of_wrong.rig, wrong));
+  EXPECT_FALSE(replaced(wrong, wrong));
 }
 
 // The same rig with a principal point of camera 0 that is wrong by 12 px, and the extrinsics that a calibration finds
@@ -338,6 +365,20 @@ TEST(KeepScale, TheMapKeepsItsScaleUnlessTheBaselinesDifferTooMuch) {
                 (keeps ? 1.0 : factor) / estimate.scale_change, 1e-9);
     EXPECT_NEAR(kept.scale_change, keeps ? 1.0 : factor, 1e-12);
   }
+}
+
+TEST(KeepScale, TheMapOfASingleCameraAlwaysKeepsItsScale) {
+  const camera::Rig truth = synthetic::ring_rig(1);
+  map::SimulatedMap world = mapped(truth, with_wrong_intrinsics(truth), 20, 0.3);
+  const RigRefinement estimate = refine(world.map);
+  ASSERT_TRUE(estimate.done);
+  RigRefinement kept = scaled(estimate, 1.2 / estimate.scale_change);
+  keep_scale({}, kept);
+  EXPECT_NEAR(kept.scale_change, 1.0, 1e-12);
+  map::MapDraft draft = world.draft();
+  const double before = path_length(world.map);
+  apply(kept, draft);
+  EXPECT_NEAR(path_length(draft.map()) / before, 1.0, 2e-3);
 }
 
 double true_path_length(const map::SimulatedMap& world) {

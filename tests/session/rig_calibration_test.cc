@@ -124,11 +124,20 @@ TEST(NominalIntrinsics, HaveTheGivenFieldOfView) {
   EXPECT_FALSE(with_nominal_intrinsics(rig, "ucm", 90).ok());
 }
 
-TEST_F(RigCalibrationOfRecording, ASingleCameraIsAnError) {
-  const std::vector<dataset::Dataset> recordings = {opened({0})};
+TEST_F(RigCalibrationOfRecording, CorrectsTheIntrinsicsOfASingleCamera) {
+  std::vector<dataset::Dataset> recordings = {opened({0})};
+  const double fx = camera::parameters(recordings[0].rig.camera(0).model)(0);
+  recordings[0].rig = rough(recordings[0].rig);
+  recordings[0].whole_rig.reset();
   const auto found = calibrate_rig(recordings, request());
-  ASSERT_FALSE(found.ok());
-  EXPECT_NE(found.error().message().find("two cameras"), std::string::npos) << found.error().message();
+  ASSERT_TRUE(found.ok()) << found.error().message();
+  const double estimate = camera::parameters(found->joint.rig.camera(0).model)(0);
+  EXPECT_LT(std::abs(estimate / fx - 1), 0.01);
+  EXPECT_LT(std::abs(estimate - fx), 4 * found->joint.cameras[0].intrinsics[0].std);
+  EXPECT_EQ(found->scale_std, 0);
+  const std::string text = calibration_text(*found);
+  EXPECT_EQ(text.find("common factor"), std::string::npos) << text;
+  EXPECT_EQ(text.find("rotation y"), std::string::npos) << text;
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <map>
 #include <vector>
 
+#include "rig_formats/rig_file.h"
 #include "whole/command_line.h"
 
 namespace bslam {
@@ -84,6 +85,25 @@ TEST_F(CommandLine, NoFileThatIsReadAndNoneOfAnotherKindIsReplaced) {
     EXPECT_NE(read_text(out("stderr")).find(message), std::string::npos) << read_text(out("stderr"));
     EXPECT_EQ(read_text(file), before);
   }
+}
+
+// Its resolution is that of the images. Several cameras cannot be matched without their poses.
+TEST_F(CommandLine, TheCalibrationOfASingleCameraNeedsNoRigFile) {
+  fs::create_directories(out("clip"));
+  fs::create_directory_symlink(fs::absolute(data()) / "mav0/cam0/data", out("clip/left"));
+  const std::string calibrate = "rig calibrate " + out("clip") + " --model pinhole-radtan --fov 90 --progress never " +
+                                "--set features.per_image=300 --out " + out("camera.yaml");
+  const Ran one = run(calibrate);
+  ASSERT_EQ(one.status, 0) << one.err;
+  const auto found = rig_formats::read_rig(out("camera.yaml")), truth = rig_formats::read_rig(data() + "/rig.yaml");
+  ASSERT_TRUE(found.ok() && truth.ok());
+  ASSERT_EQ(found->size(), 1u);
+  EXPECT_EQ(found->camera(0).width, truth->camera(0).width);
+  EXPECT_EQ(found->camera(0).height, truth->camera(0).height);
+  fs::create_directory_symlink(fs::absolute(data()) / "mav0/cam1/data", out("clip/right"));
+  const Ran two = run(calibrate + " --overwrite");
+  EXPECT_EQ(two.status, 2);
+  EXPECT_NE(two.err.find("no calibration in "), std::string::npos) << two.err;
 }
 
 TEST_F(CommandLine, EvalSaysIfItsFilesAreExchanged) {
