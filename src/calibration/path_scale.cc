@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "base/assert.h"
+#include "calibration/calibration_prior.h"
 #include "calibration/rig_frame.h"
 
 namespace bslam::calibration {
@@ -52,7 +53,7 @@ void keep_scale(const CalibrationOptions& options, RigRefinement& refinement) {
   const double factor = 1 / refinement.scale_change;
   const double tolerance =
       std::max(0.01 * options.scale_tolerance_percent, std::min(refinement.scale_deviation, kMaxDeviation));
-  const bool arbitrary = refinement.rig->size() == 1;
+  const bool arbitrary = longest_baseline(*refinement.rig) == 0;
   if (!arbitrary && !(std::abs(std::log(factor)) < tolerance)) return;
   solver::RigValues values = solver::RigValues::of(refinement.rig->in_frame_of_camera_0());
   for (geometry::SE3& T : values.T_cam_rig) T = geometry::scaled(T, factor);

@@ -16,10 +16,10 @@ double path_deviation(const RigProblem& problem, const std::vector<geometry::Pos
 
 // Rescales the rig, poses and landmarks of the estimate so that the length of the trajectory is that of before the
 // estimate. Does nothing if this would change the baselines by at least scale_tolerance_percent and by at least the
-// standard deviation of the scale, capped at 5 %; the scale of a single camera is arbitrary and always kept. Before the
-// call, the common scale of the baselines is exactly the calibrated one. Single baselines are uncertain at first:
-// without this function, every estimate would change the scale of the live trajectory. The factor is recorded in
-// kept_scale, from which apply() adds it to the uncertainty of the calibration.
+// standard deviation of the scale, capped at 5 %; without baselines, as with a single camera, the scale is arbitrary
+// and always kept. Before the call, the common scale of the baselines is exactly the calibrated one. Single baselines
+// are uncertain at first: without this function, every estimate would change the scale of the live trajectory. The
+// factor is recorded in kept_scale, from which apply() adds it to the uncertainty of the calibration.
 void keep_scale(const CalibrationOptions& options, RigRefinement& refinement);
 
 }  // namespace bslam::calibration

@@ -169,8 +169,7 @@ bool replaced(const camera::Rig& of_map, const camera::Rig& calibrated) {
   for (std::size_t c = 1; c < calibrated.size(); ++c) {
     if (of_map.body_from_cam(c).matrix() != calibrated.body_from_cam(c).matrix()) return true;
   }
-  return calibrated.size() == 1 &&
-         camera::parameters(of_map.camera(0).model) != camera::parameters(calibrated.camera(0).model);
+  return camera::parameters(of_map.camera(0).model) != camera::parameters(calibrated.camera(0).model);
 }
 
 std::optional<RigRefinement> refine_if_accepted(const map::BundledMap& map, const camera::Rig& calibrated,

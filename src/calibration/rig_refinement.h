@@ -190,8 +190,8 @@ Eigen::MatrixXd prior_information(const camera::Rig& calibrated, const Calibrati
 
 // Whether the rig of a map is to be replaced by the estimate.
 bool accepted(const RigRefinement& refinement, const CalibrationOptions& options);
-// Whether an earlier estimate has replaced the calibration of a map. An accepted estimate always changes extrinsics,
-// and the intrinsics of a single camera.
+// Whether an earlier estimate has replaced the calibration of a map. An accepted estimate always changes extrinsics
+// and the intrinsics of camera 0.
 bool replaced(const camera::Rig& of_map, const camera::Rig& calibrated);
 // Returns the result of refine_rig if the estimate is to be accepted. If that depends on the verdict, the verdict is
 // determined first from a fraction of the keyframes and landmarks.
