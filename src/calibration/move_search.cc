@@ -159,8 +159,7 @@ RigEstimate estimate_rig_and_moves(const EstimateInput& input, const RigAdjustme
   MoveSearch search(input);
   RigEstimate known = cameras.moves().empty() ? estimate_rig(input, prior, std::move(cameras))
                                               : search.estimate_significant_moves(prior, std::move(cameras));
-  const bool single = input.map.rig().size() == 1;  // nothing that it could be moved relative to
-  if (!known.settled || single) return known;
+  if (!known.settled) return known;
   // The first moves that are found may be at wrong times and be replaced by others.
   std::optional<RigEstimate> latest;
   std::vector<std::size_t> dropped;  // cameras of the latest problem

@@ -178,8 +178,8 @@ std::vector<PossibleMove> MovedCameras::likely_moves(const map::BundledMap& map,
   const std::vector<std::size_t> poses = poses_by_time(map, problem);
   const std::vector<ImageEquations> equations = image_equations(problem, values);
   std::vector<PossibleMove> out;
-  // Of two cameras, the images show the relative extrinsics only.
-  for (std::size_t c = cameras_ == 2 ? 1 : 0; c < cameras; ++c) {
+  // Of two cameras, the images show the relative extrinsics only; of a single one, none.
+  for (std::size_t c = cameras_ <= 2 ? 1 : 0; c < cameras; ++c) {
     ImageEquations all, after;
     PossibleMove best{.camera = c};
     for (const std::size_t pose : poses) all.add(equations[pose * cameras + c]);

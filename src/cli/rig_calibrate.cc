@@ -49,10 +49,10 @@ Status check_out(const CalibrateArguments& a) {
 }
 
 // The start for the images of a single camera without a calibration, which needs no rig file: its model is that of the
-// command line, and its resolution that of the images. nullopt for several cameras.
+// command line, and its resolution that of the images. nullopt for several cameras, and if something else is missing.
 std::optional<camera::Rig> rig_of_single_camera(const dataset::DatasetRequest& request) {
   const auto recording = dataset::describe_recording(request);
-  if (!recording) return std::nullopt;
+  if (!recording || !recording->only_uncalibrated) return std::nullopt;
   const auto in_use = [](const dataset::StreamDescription& stream) { return stream.camera >= 0; };
   const auto stream = std::ranges::find_if(recording->streams, in_use);
   if (std::ranges::count_if(recording->streams, in_use) != 1 || stream->width <= 0) return std::nullopt;
@@ -71,8 +71,11 @@ Result<std::vector<dataset::Dataset>> open_recordings(const CalibrateArguments& 
     one.path = path;
     auto request = dataset_request(one, config.io.sync_tolerance);
     if (!request) return request.error();
-    if (a.fov_deg && one.rig.empty()) request->rig_of_map = rig_of_single_camera(*request);
     auto opened = dataset::open_dataset(*request);
+    if (!opened && a.fov_deg && one.rig.empty()) {
+      request->rig_of_map = rig_of_single_camera(*request);
+      if (request->rig_of_map) opened = dataset::open_dataset(*request);
+    }
     if (!opened) return opened.error();
     const camera::Rig& first = out.empty() ? opened->rig : out.front().rig;
     if (opened->rig.size() != first.size() || !opened->rig.same_calibration(first))
