@@ -12,6 +12,7 @@ function(bslam_layer name)
     set_target_properties(bslam_${name} PROPERTIES POSITION_INDEPENDENT_CODE ON CXX_VISIBILITY_PRESET hidden
                                                    VISIBILITY_INLINES_HIDDEN ON)
     bslam_use_precompiled(bslam_${name} bslam_precompiled)
+    bslam_unite(bslam_${name} 8)
   else()  # headers only
     add_library(bslam_${name} INTERFACE)
     target_link_libraries(bslam_${name} INTERFACE ${ARG_USES} ${ARG_LINKS})

@@ -29,6 +29,12 @@ function(bslam_unite target files)
   endif()
 endfunction()
 
+# bslam_separate(source...): these sources of the present folder are compiled on their own nevertheless, because they use
+# names of others for different things, or because GCC 12 would warn of errors that are none.
+function(bslam_separate)
+  set_source_files_properties(${ARGN} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+endfunction()
+
 if(BSLAM_PRECOMPILED)
   if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
     add_compile_options(-fpch-preprocess)  # so that ccache sees what a file includes

@@ -5,6 +5,7 @@
 #include <iterator>
 #include <map>
 
+#include "adjustment/capture_times.h"
 #include "adjustment/landmark_noise.h"
 #include "adjustment/pose_uncertainty.h"
 #include "base/median.h"
@@ -137,6 +138,7 @@ bool adjust_map(const Selection& selection, const AdjustmentOptions& options, co
       .iterations = options.robust_iterations, .relative_decrease = options.relative_decrease, .robust = true};
   const auto robust = solver::adjust(selected.problem, solve, {}, stop);
   if (!robust.usable()) return false;
+  std::vector<map::CaptureTime> times = correct_capture_times(draft.map(), selected);
   PoseUncertainties uncertainties;
   if (!stop.stop_requested() && options.final_iterations > 0)
     uncertainties = adjust_inliers(draft.map(), selection, options, selected, stop);
@@ -148,6 +150,7 @@ bool adjust_map(const Selection& selection, const AdjustmentOptions& options, co
   std::vector<LandmarkId> touched;
   for (const auto& [landmark, position] : poses.landmarks) touched.push_back(landmark);
   draft.set_poses(std::move(poses));
+  draft.correct_times(std::move(times));
   for (const ObservationSource& s : bad) {
     if (draft.map().alive(s.landmark)) draft.remove_observation(s.landmark, s.keyframe);
   }

@@ -16,6 +16,12 @@ double BundledFrame::delay_s(std::size_t c) const {
   return camera.state == image::ImageState::kPresent ? to_seconds(camera.time_ns - time_ns) : 0.0;
 }
 
+void CameraFrame::correct_time(double shift_s) {
+  const TimeNs shift_ns = from_seconds(shift_s);
+  time_ns += shift_ns;
+  correction_ns += shift_ns;
+}
+
 BundledFrame without_images(const BundledFrame& frame) {
   BundledFrame out;
   out.id = frame.id;

@@ -18,10 +18,17 @@ namespace bslam::frame {
 // The data of one camera of a frame.
 struct CameraFrame {
   image::ImageState state = image::ImageState::kMissing;
-  TimeNs time_ns = 0;            // its own capture time
+  TimeNs time_ns = 0;  // its own capture time
+  // The part of it that the images show, and not the stamp; and the variance of the errors of the camera's stamps,
+  // which is 0 if they are taken as exact (tracking/stamp_errors.h).
+  TimeNs correction_ns = 0;
+  double stamp_variance_s2 = 0;
   feature::Keypoints keypoints;  // empty if the image is missing or damaged
   FeatureGrid grid;              // grid of the keypoints' pixels
   SharedArray<WordId> words;     // per keypoint, word of the vocabulary; empty until computed
+
+  // The image was captured so much later.
+  void correct_time(double shift_s);
 };
 
 // What the matched features of a frame say about the size of a map whose scale is not known.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <limits>
 
 namespace bslam::frame {
 
@@ -13,6 +14,16 @@ bool can_be_compared(const BundledFrame& frame, CameraIndex a, CameraIndex b) {
 bool captured_apart(const BundledFrame& frame, CameraIndex a, CameraIndex b) {
   return !frame.cameras[a.index()].keypoints.empty() && !frame.cameras[b.index()].keypoints.empty() &&
          !can_be_compared(frame, a, b);
+}
+
+std::size_t reference_camera(const BundledFrame& frame) {
+  const auto apart_ns = [&](const CameraFrame& camera) {
+    const bool present = camera.state == image::ImageState::kPresent;
+    return present ? std::abs(camera.time_ns - camera.correction_ns - frame.time_ns)
+                   : std::numeric_limits<TimeNs>::max();
+  };
+  const auto nearest = std::ranges::min_element(frame.cameras, {}, apart_ns);
+  return static_cast<std::size_t>(nearest - frame.cameras.begin());
 }
 
 double capture_span_s(const BundledFrame& frame) {

@@ -20,6 +20,8 @@ constexpr TimeNs kTogetherNs = 2'000'000;
 bool can_be_compared(const BundledFrame& frame, CameraIndex a, CameraIndex b);
 // Returns true if both cameras have keypoints that cannot be compared.
 bool captured_apart(const BundledFrame& frame, CameraIndex a, CameraIndex b);
+// The camera that determines the time of the frame.
+std::size_t reference_camera(const BundledFrame& frame);
 // Time between the first and the last image of the frame.
 double capture_span_s(const BundledFrame& frame);
 

@@ -18,6 +18,13 @@ struct Covisible {
   int weight = 0;
 };
 
+// A change of the capture time of one image of a keyframe.
+struct CaptureTime {
+  KeyframeId keyframe;
+  CameraIndex camera;
+  double shift_s = 0;
+};
+
 // `landmarks` and `covisible` are shared between versions separately from the other members, so that a change of the
 // pose copies neither. Both can be read like a const std::vector.
 struct BundledKeyframe {

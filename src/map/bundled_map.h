@@ -217,6 +217,7 @@ class BundledMap {
   void scale_keyframes(std::span<const std::pair<KeyframeId, double>> factors);
   bool set_pose(KeyframeId k, const geometry::SE3& T_rig_world);
   bool set_twist(KeyframeId k, const geometry::Vector6d& twist);
+  bool correct_time(const CaptureTime& change);
   bool set_uncertainty(KeyframeId k, geometry::PoseUncertainty uncertainty);
   bool set_position(LandmarkId l, const Eigen::Vector3d& position);
   bool add_visibility_counts(LandmarkId l, std::uint32_t expected, std::uint32_t found);

@@ -88,6 +88,12 @@ void MapDraft::set_twists(std::vector<std::pair<KeyframeId, geometry::Vector6d>>
   edit_.operations.emplace_back(SetTwists{std::move(twists)});
 }
 
+void MapDraft::correct_times(std::vector<CaptureTime> changes) {
+  std::erase_if(changes, [&](const CaptureTime& change) { return !working_.correct_time(change); });
+  if (changes.empty()) return;
+  edit_.operations.emplace_back(CorrectTimes{std::move(changes)});
+}
+
 void MapDraft::add_visibility_counts(std::vector<VisibilityCount> visibility_counts) {
   // The counts were collected over several map versions.
   for (VisibilityCount& s : visibility_counts) s.landmark = working_.resolve(s.landmark);

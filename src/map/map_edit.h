@@ -24,6 +24,7 @@
 // |                     | uncertainties                                                                            |
 // | SetTwists           | entries of removed keyframes are dropped; translational velocities are multiplied by the |
 // |                     | change of scale at the keyframe since the base                                           |
+// | CorrectTimes        | entries of removed keyframes are dropped                                                 |
 // | ScaleSubmap         | also scales newer keyframes and landmarks; dropped if the submap was removed or merged   |
 // | MergeSubmaps        | a removed keyframe is replaced by its nearest alive ancestor; dropped if both are in the |
 // |                     | same submap                                                                              |
@@ -105,6 +106,9 @@ struct SetPoses {
 struct SetTwists {
   std::vector<std::pair<KeyframeId, geometry::Vector6d>> keyframes;  // BundledKeyframe::twist
 };
+struct CorrectTimes {
+  std::vector<CaptureTime> changes;
+};
 struct VisibilityCount {
   LandmarkId landmark;
   std::uint32_t expected = 0, found = 0;
@@ -129,7 +133,7 @@ struct SetRig {
 
 using Operation = std::variant<AddKeyframe, AddLandmark, AddObservation, RemoveObservation, RemoveLandmark,
                                MergeLandmarks, RemoveKeyframe, MergeSubmaps, RemoveSubmap, ScaleSubmap, SetPoses,
-                               SetTwists, AddVisibilityCounts, RefreshLandmarks, SetScale, SetRig>;
+                               SetTwists, CorrectTimes, AddVisibilityCounts, RefreshLandmarks, SetScale, SetRig>;
 
 struct MapEdit {
   MapSnapshot base;
@@ -167,6 +171,7 @@ class MapDraft {
   bool scale_submap(KeyframeId root, double factor);
   // Entries of removed keyframes and landmarks are ignored.
   void set_poses(SetPoses poses);
+  void correct_times(std::vector<CaptureTime> changes);
   void set_twists(std::vector<std::pair<KeyframeId, geometry::Vector6d>> twists);
   void add_visibility_counts(std::vector<VisibilityCount> visibility_counts);
   void refresh_landmarks(std::vector<LandmarkId> landmarks);

@@ -65,6 +65,7 @@ class Rebase {
   bool operator()(const ScaleSubmap& op) { return map_.scale_submap(map_id(op.root), op.factor); }
   bool operator()(const SetPoses& op);
   bool operator()(const SetTwists& op);
+  bool operator()(const CorrectTimes& op);
   bool operator()(const AddVisibilityCounts& op);
   bool operator()(const RefreshLandmarks& op);
   bool operator()(const SetScale& op);
@@ -227,6 +228,15 @@ bool Rebase::operator()(const SetTwists& op) {
   for (const auto& [edit_id, twist] : op.keyframes) {
     const Motion motion = motion_since_base(edit_id);
     any |= map_.set_twist(map_id(edit_id), geometry::scaled(twist, motion ? motion->scale_change : 1.0));
+  }
+  return any;
+}
+
+bool Rebase::operator()(const CorrectTimes& op) {
+  bool any = false;
+  for (CaptureTime change : op.changes) {
+    change.keyframe = map_id(change.keyframe);
+    any |= map_.correct_time(change);
   }
   return any;
 }

@@ -27,6 +27,22 @@ calibration::ImageResiduals residuals_of_frames(const RunRecord& record, std::si
   return empty;
 }
 
+// Root mean square of the corrections of the capture times of a camera in the keyframes of the run; 0 if hardly any are
+// larger than those that errors of the calibration cause.
+double stamp_error_s(const map::BundledMap& map, KeyframeId first, std::size_t camera) {
+  constexpr double kLarge_s = 0.5e-3;
+  double sum = 0;
+  int count = 0;
+  for (const KeyframeId k : map.keyframe_ids()) {
+    const frame::CameraFrame& image = map.keyframe(k).frame->cameras[camera];
+    if (k < first || image.state != image::ImageState::kPresent) continue;
+    sum += std::pow(to_seconds(image.correction_ns), 2);
+    ++count;
+  }
+  const double error_s = count > 0 ? std::sqrt(sum / count) : 0.0;
+  return error_s < kLarge_s ? 0.0 : error_s;
+}
+
 void add_cameras(const RecordInput& input, RunRecord& record) {
   const std::vector<calibration::ImageResiduals> residuals =
       calibration::image_residuals(*input.system.snapshot(), input.system.first_keyframe());
@@ -43,6 +59,8 @@ void add_cameras(const RecordInput& input, RunRecord& record) {
     camera.states = camera_intervals(record.frames, c);
     camera.residuals = residuals[input.system.first_camera() + c];
     if (input.config.localize_only) camera.residuals = residuals_of_frames(record, c, std::move(camera.residuals));
+    camera.stamp_error_s =
+        stamp_error_s(*input.system.snapshot(), input.system.first_keyframe(), input.system.first_camera() + c);
     const auto& found = input.system.calibration().cameras;
     if (c > 0 && c < found.size()) {
       const calibration::CameraRefinement& r = found[c];

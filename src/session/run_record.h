@@ -70,6 +70,8 @@ struct CameraRecord {
   std::string first_skipped = {};                   // file and cause of damage of the first skipped image
   // Residuals of the keyframes of the run in the final map; if the run only localises, of the poses of its frames.
   calibration::ImageResiduals residuals = {};
+  // Root mean square of the errors of its time stamps that the run corrected; 0 if they are small.
+  double stamp_error_s = 0.0;
 };
 
 // A camera that was moved relative to the others during the run.

@@ -235,6 +235,12 @@ std::vector<std::string> warnings_after_run(const RunRecord& record, const camer
       warn(warnings, "{}: {} of its images could not be read, the first: {}", camera.name, camera.skipped,
            camera.first_skipped);
     }
+    if (camera.stamp_error_s > 0) {
+      warn(warnings,
+           "{}: its time stamps have errors of about {:.1f} ms that differ from image to image; the times at which its "
+           "images were captured were estimated from what they show",
+           camera.name, 1e3 * camera.stamp_error_s);
+    }
     warn_of_outages(camera, warnings);
     warn_of_disagreement(record, c, check_command, warnings);
   }

@@ -9,6 +9,7 @@
 #include "tracking/motion_prediction.h"
 #include "tracking/pose_confirmation.h"
 #include "tracking/robust_pose.h"
+#include "tracking/stamp_errors.h"
 #include "tracking/track_output.h"
 #include "tracking/view_rotation.h"
 
@@ -98,9 +99,10 @@ bool track_in_narrow_windows(const TrackInput& input, const std::vector<Landmark
   std::vector<std::uint8_t> excluded = out.excluded;
   drop(excluded, found);
   if (count(found) < static_cast<std::size_t>(options.min_inliers)) return false;
+  const auto observations = pose_observations(map, frame, found, input.features);
+  correct_capture_times(input, observations, predicted, out.frame);
   const solver::MotionModel motion = motion_model(input, frame);
-  auto [solution, matches, contest] = robust_pose(
-      input, frame, found, pose_observations(map, frame, found, input.features), predicted, motion, options.pose);
+  auto [solution, matches, contest] = robust_pose(input, frame, found, observations, predicted, motion, options.pose);
   const std::vector<std::uint8_t> contradicting =
       exclude_contradicting(input, frame, options, found, excluded, solution);
   const bool few = !supported(solution, std::min(matches, count(found)), options.min_inliers, options);
@@ -246,8 +248,9 @@ std::vector<LandmarkCounts> landmark_counts(const MatchSearch& search) {
   return out;
 }
 
-// Pose from all landmarks of the local view, with keypoints aligned to their landmarks' patches.
-Fine track_local_view(const TrackInput& input, const Coarse& coarse, const TrackingOptions& options, ThreadPool& pool) {
+// Pose from all landmarks of the local view, with keypoints aligned to their landmarks' patches. Corrects the capture
+// times of the frame.
+Fine track_local_view(const TrackInput& input, Coarse& coarse, const TrackingOptions& options, ThreadPool& pool) {
   const map::BundledMap& map = input.map;
   const frame::BundledFrame& frame = coarse.frame;
   const bool any_matches = count(coarse.matches) > 0;
@@ -269,9 +272,10 @@ Fine track_local_view(const TrackInput& input, const Coarse& coarse, const Track
   out.visible = std::move(search.visible);
   out.aligned =
       align_matches(map, frame, coarse.T_rig_world, out.matches, input.pyramids, input.alignment, input.features, pool);
+  const auto observations = pose_observations(map, out.matches, out.aligned);
+  correct_capture_times(input, observations, coarse.T_rig_world, coarse.frame);
   const solver::MotionModel motion = motion_model(input, frame);
-  auto chosen = robust_pose(input, frame, out.matches, pose_observations(map, out.matches, out.aligned),
-                            coarse.T_rig_world, motion, options.pose);
+  auto chosen = robust_pose(input, frame, out.matches, observations, coarse.T_rig_world, motion, options.pose);
   out.solution = std::move(chosen.solution);
   out.num_matches = chosen.matches;
   out.contest = coarse.contest;
@@ -380,7 +384,7 @@ TrackOutput track(const TrackInput& input, const frame::BundledFrame& frame, con
   if (!any_image) return lost(input.state, frame, LostReason::kNoImages);
   if (frame.num_keypoints() < static_cast<std::size_t>(options.min_inliers))
     return lost(input.state, frame, LostReason::kFewFeatures);
-  const Coarse coarse = coarse_pose(input, frame, options, pool);
+  Coarse coarse = coarse_pose(input, frame, options, pool);
   if (coarse.reason != LostReason::kNone) return lost(input.state, frame, coarse.reason);
   Fine fine = track_local_view(input, coarse, options, pool);
   if (fine.solution.num_inliers < options.min_inliers) return lost(input.state, frame, LostReason::kFewInliers);

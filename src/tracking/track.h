@@ -86,6 +86,19 @@ struct DirectState {
   std::shared_ptr<const LocalView> view = {};
 };
 
+// The error of a time stamp that a frame shows.
+struct StampError {
+  double error_s = 0, variance_s2 = 0;
+  TimeNs time_ns = 0;  // of the frame
+};
+
+// What the frames so far show of the errors of a camera's time stamps (tracking/stamp_errors.h).
+struct StampErrors {
+  double variance_s2 = 0;
+  double mean_s = 0;  // not corrected: it is a time offset, that is part of the calibration
+  std::optional<StampError> last, before_last;
+};
+
 // State of tracking that is carried from frame to frame.
 struct TrackerState {
   TrackStatus status = TrackStatus::kNotStarted;
@@ -98,6 +111,7 @@ struct TrackerState {
   std::vector<LandmarkId> landmarks;          // inliers of the last tracked frame
   std::vector<CameraConsensusState> cameras;  // empty until a frame was tracked
   std::vector<CameraReference> references;    // per camera
+  std::vector<StampErrors> stamps;            // per camera
   DirectState direct;
   // Not yet added to the map; one for each landmark, sorted.
   std::vector<map::VisibilityCount> visibility_counts;

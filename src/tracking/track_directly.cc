@@ -6,6 +6,7 @@
 #include "tracking/keyframe_decision.h"
 #include "tracking/motion_prediction.h"
 #include "tracking/robust_pose.h"
+#include "tracking/stamp_errors.h"
 #include "tracking/track_output.h"
 #include "tracking/visible_landmarks.h"
 
@@ -101,6 +102,7 @@ bool track_coarsely(const TrackInput& input, const LastLandmarks& last, const Tr
   for (auto& camera : alignment) camera.max_shift_px = options.direct.coarse_shift_px;
   const AlignedLandmarks found = align(input, frame, T_rig_world, candidates, alignment, pool);
   const auto observations = pose_observations(input.map, found.matches, found.aligned);
+  correct_capture_times(input, observations, T_rig_world, frame);
   const solver::MotionModel motion = motion_model(input, frame);
   const auto [solution, matches, contest] =
       robust_pose(input, frame, found.matches, observations, T_rig_world, motion, options.pose);
@@ -173,6 +175,7 @@ DirectOutput track_directly(const TrackInput& input, frame::BundledFrame frame, 
   const LocalLandmarks local = local_landmarks(input, frame, T_rig_world, last, options, pool);
   AlignedLandmarks found = align(input, frame, T_rig_world, local.candidates, input.alignment, pool);
   const auto observations = pose_observations(input.map, found.matches, found.aligned);
+  correct_capture_times(input, observations, T_rig_world, frame);
   const solver::MotionModel motion = motion_model(input, frame);
   auto [solution, matches, contest] =
       robust_pose(input, frame, found.matches, observations, T_rig_world, motion, options.pose);

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "tracking/motion_prediction.h"
+#include "tracking/stamp_errors.h"
 
 namespace bslam::tracking {
 namespace {
@@ -148,6 +149,7 @@ TrackOutput output_of(const TrackInput& input, TrackedFrame found) {
   state.landmarks = landmarks_of(out.matches);
   count_visibility(found.visible, state.landmarks, state.visibility_counts);
   state.cameras.resize(out.matches.size());
+  update_stamp_errors(map, frame, result.T_rig_world, out.matches, state.stamps);
   for (std::size_t c = 0; c < state.references.size(); ++c) {
     ++state.references[c].frames;
     state.references[c].late |= frame.cameras[c].state != image::ImageState::kPresent;

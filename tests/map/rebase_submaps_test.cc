@@ -162,6 +162,22 @@ TEST_F(RebaseTest, MotionScalesWithTheSubmapAndIsDroppedWithItsKeyframe) {
   EXPECT_FALSE(report.published->alive(kThird));
 }
 
+TEST_F(RebaseTest, CaptureTimesAddUpAndAreDroppedWithTheirKeyframe) {
+  early->correct_times({{kSecond, CameraIndex(0), 0.002}});
+  early->remove_keyframe(kThird);
+  const KeyframeId newer = add_keyframe(*late, same_numbers(0, 5));
+  const TimeNs before = late->map().keyframe(kSecond).frame->cameras[0].time_ns;
+  late->correct_times(
+      {{kSecond, CameraIndex(0), 0.001}, {kThird, CameraIndex(0), 0.001}, {newer, CameraIndex(0), -0.001}});
+  EXPECT_EQ(late->map().keyframe(kSecond).frame->cameras[0].time_ns, before + 1'000'000);
+  const CommitReport report = commit();
+  const frame::CameraFrame& camera = report.published->keyframe(kSecond).frame->cameras[0];
+  EXPECT_EQ(camera.time_ns, before + 3'000'000);
+  EXPECT_EQ(camera.correction_ns, 3'000'000);
+  EXPECT_EQ(report.published->keyframe(report.keyframes.at(0)).frame->cameras[0].correction_ns, -1'000'000);
+  EXPECT_FALSE(report.published->alive(kThird));
+}
+
 // The rig with longer focal lengths.
 camera::Rig zoomed(const camera::Rig& rig) {
   std::vector<camera::RigCamera> cameras;

@@ -72,6 +72,16 @@ TEST(RunWarnings, AMovedCameraIsNamedWithWhatBecameOfTheMove) {
   }
 }
 
+TEST(RunWarnings, ErrorsOfTimeStampsThatWereCorrectedAreSaid) {
+  const camera::Rig rig = synthetic::ring_rig(2);
+  RunRecord record;
+  record.cameras.resize(2);
+  record.cameras[1].name = "left";
+  EXPECT_FALSE(has_text(warnings_after_run(record, rig, ""), "time stamps have errors"));
+  record.cameras[1].stamp_error_s = 0.0023;
+  EXPECT_TRUE(has_text(warnings_after_run(record, rig, ""), "left: its time stamps have errors of about 2.3 ms"));
+}
+
 TEST(RunWarnings, ACameraThatIsOneFrameLateIsNamedFirst) {
   RunRecord record;
   record.cameras.resize(2);
