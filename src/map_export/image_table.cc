@@ -3,6 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdlib>
+#include <iterator>
+#include <limits>
 #include <map>
 #include <set>
 #include <utility>
@@ -75,6 +78,27 @@ class RecordedImages {
     constexpr TimeNs kRounding = 1000;  // a time offset that is not a whole number of nanoseconds
     const auto next = by_time_[camera].lower_bound(stamp_ns - kRounding);
     return next != by_time_[camera].end() && next->first <= stamp_ns + kRounding ? &next->second : nullptr;
+  }
+
+  // The image whose stamp is by far the nearest one. A run corrects the capture times of images whose stamps are wrong
+  // by some milliseconds (frame::CameraFrame::correction_ns).
+  const RecordedImage* near(std::size_t camera, TimeNs stamp_ns) const {
+    constexpr TimeNs kMostCorrected = 20'000'000;
+    constexpr double kByFar = 2.0;
+    const auto& images = by_time_[camera];
+    const auto next = images.lower_bound(stamp_ns);
+    TimeNs nearest = std::numeric_limits<TimeNs>::max(), second = nearest;
+    const RecordedImage* out = nullptr;
+    const auto consider = [&](const auto& entry) {
+      const TimeNs apart = std::abs(entry.first - stamp_ns);
+      second = std::min(second, std::max(nearest, apart));
+      if (apart < nearest) out = &entry.second;
+      nearest = std::min(nearest, apart);
+    };
+    if (next != images.end()) consider(*next);
+    if (next != images.begin()) consider(*std::prev(next));
+    return nearest <= kMostCorrected && static_cast<double>(second) >= kByFar * static_cast<double>(nearest) ? out
+                                                                                                             : nullptr;
   }
 
  private:
@@ -178,12 +202,20 @@ ImageTable::ImageTable(const Selection& selection, const dataset::Dataset* data,
   std::vector<const RecordedImage*> found;
   for (const KeyframeId k : selection.keyframes) {
     const frame::BundledFrame& frame = *selection.map->keyframe(k).frame;
+    const std::size_t first = images_.size();
     for (std::size_t c = 0; c < cameras_; ++c) {
       if (frame.cameras[c].state != image::ImageState::kPresent) continue;
       const TimeNs stamp_ns = frame.cameras[c].time_ns - rig.camera(c).time_offset_ns;
       number_[k.index() * cameras_ + c] = static_cast<int>(images_.size());
       images_.push_back({k, c, fmt::format("{}/{}.png", folders[c], stamp_ns), {}, {}});
       found.push_back(recorded.at(c, stamp_ns));
+    }
+    // One image with this stamp shows that this is the recording.
+    const bool recorded_too = std::any_of(found.begin() + static_cast<std::ptrdiff_t>(first), found.end(),
+                                          [](const RecordedImage* image) { return image != nullptr; });
+    for (std::size_t i = first; recorded_too && i < found.size(); ++i) {
+      const std::size_t c = images_[i].camera;
+      if (!found[i]) found[i] = recorded.near(c, frame.cameras[c].time_ns - rig.camera(c).time_offset_ns);
     }
   }
   if (any_twice(found) || !sample_is_shown(*selection.map, data, images_, found, stop))

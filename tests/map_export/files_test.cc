@@ -443,6 +443,15 @@ TEST_F(MapExportFiles, NamesFromFilesCannotLeadOutOfTheFolderOrBreakLines) {
   EXPECT_EQ(names.size(), images.images().size());
 }
 
+// A run corrects the capture times of images whose stamps are wrong.
+TEST_F(MapExportFiles, ImagesWithCorrectedCaptureTimesAreFound) {
+  for (const KeyframeId k : selection_.keyframes) map_.correct_time({k, CameraIndex(1), 0.004});
+  const ImageTable images(selection_, &data_, root());
+  EXPECT_EQ(images.found(), images.images().size());
+  for (dataset::FrameEntry& frame : data_.frames) frame.images[1]->time_ns += 30'000'000;
+  EXPECT_EQ(ImageTable(selection_, &data_, root()).found(), images.images().size() / 2);
+}
+
 TEST_F(MapExportFiles, ARecordingWithoutTheImagesIsAnError) {
   for (dataset::FrameEntry& frame : data_.frames)
     for (auto& image : frame.images) image->time_ns += 5'000'000;
