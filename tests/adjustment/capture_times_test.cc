@@ -10,9 +10,9 @@
 namespace bslam::adjustment {
 namespace {
 
-constexpr feature::FeatureModel kFeatures{.sigma_px = 0.7, .pyramid = {}};
+constexpr feature::FeatureModel kStampFeatures{.sigma_px = 0.7, .pyramid = {}};
 constexpr double kStampDeviation_s = 0.004;
-constexpr int kKeyframes = 12;
+constexpr int kMapKeyframes = 12;
 
 // A map of true poses whose keyframes have stamps with errors in all cameras but the first.
 struct MapWithWrongStamps {
@@ -24,7 +24,7 @@ MapWithWrongStamps make_map(double variance_s2) {
   synthetic::FeatureSimulatorOptions options;
   options.landmarks = 2500;
   options.max_keypoints = 500;
-  options.sigma_px = kFeatures.sigma_px;
+  options.sigma_px = kStampFeatures.sigma_px;
   MapWithWrongStamps out{
       map::SimulatedMap(synthetic::FeatureSimulator(synthetic::ring_rig(3), synthetic::make_orbit({}), options)), {}};
   out.world.knows_motion = true;
@@ -37,7 +37,7 @@ MapWithWrongStamps make_map(double variance_s2) {
       frame.cameras[c].stamp_variance_s2 = variance_s2;
     }
   };
-  for (int i = 0; i < kKeyframes; ++i) out.world.add_keyframe(FrameId(i), 0.25 * i);
+  for (int i = 0; i < kMapKeyframes; ++i) out.world.add_keyframe(FrameId(i), 0.25 * i);
   out.world.change_frame = nullptr;
   return out;
 }
@@ -70,7 +70,7 @@ TEST(CorrectCaptureTimes, AdjustmentFindsTheErrorsOfStamps) {
   const MapWithWrongStamps made = make_map(kStampDeviation_s * kStampDeviation_s);
   map::MapDraft draft(std::make_shared<const map::BundledMap>(made.world.map));
   const double before = time_error_s(draft.map(), made);
-  for (int i = 0; i < 3; ++i) ASSERT_TRUE(adjust_map(everything(draft.map()), {}, kFeatures, draft));
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(adjust_map(everything(draft.map()), {}, kStampFeatures, draft));
   const double after = time_error_s(draft.map(), made);
   std::printf("errors of the capture times: %.2f ms, after adjustment %.2f ms\n", 1e3 * before, 1e3 * after);
   EXPECT_LT(after, 0.35 * before);
@@ -80,7 +80,7 @@ TEST(CorrectCaptureTimes, AdjustmentFindsTheErrorsOfStamps) {
 TEST(CorrectCaptureTimes, ExactStampsStayAsTheyAre) {
   const MapWithWrongStamps made = make_map(0);
   map::MapDraft draft(std::make_shared<const map::BundledMap>(made.world.map));
-  ASSERT_TRUE(adjust_map(everything(draft.map()), {}, kFeatures, draft));
+  ASSERT_TRUE(adjust_map(everything(draft.map()), {}, kStampFeatures, draft));
   for (const KeyframeId k : draft.map().keyframe_ids()) {
     for (const frame::CameraFrame& camera : draft.map().keyframe(k).frame->cameras) EXPECT_EQ(camera.correction_ns, 0);
   }
@@ -92,11 +92,11 @@ TEST(CorrectCaptureTimes, TheVarianceOfOneKeyframeHoldsForAll) {
   made.world.change_frame = [](frame::BundledFrame& frame) {
     for (frame::CameraFrame& camera : frame.cameras) camera.stamp_variance_s2 = kStampDeviation_s * kStampDeviation_s;
   };
-  made.world.add_keyframe(FrameId(kKeyframes), 0.25 * kKeyframes);
+  made.world.add_keyframe(FrameId(kMapKeyframes), 0.25 * kMapKeyframes);
   made.error_s.emplace_back(3, 0.0);
   map::MapDraft draft(std::make_shared<const map::BundledMap>(made.world.map));
   const double before = time_error_s(draft.map(), made);
-  for (int i = 0; i < 3; ++i) ASSERT_TRUE(adjust_map(everything(draft.map()), {}, kFeatures, draft));
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(adjust_map(everything(draft.map()), {}, kStampFeatures, draft));
   EXPECT_LT(time_error_s(draft.map(), made), 0.35 * before);
 }
 

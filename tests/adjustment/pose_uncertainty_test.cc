@@ -9,7 +9,7 @@
 namespace bslam::adjustment {
 namespace {
 
-constexpr feature::FeatureModel kFeatures{.sigma_px = 0.7, .pyramid = {}};
+constexpr feature::FeatureModel kPoseFeatures{.sigma_px = 0.7, .pyramid = {}};
 constexpr AdjustmentOptions kIndependent{.relative_decrease = 1e-6, .correlated_observations = 1};
 constexpr std::uint64_t kSeeds = 300;
 
@@ -18,7 +18,7 @@ map::SimulatedMap simulated(std::uint64_t seed, int keyframes) {
   options.scene_seed = options.noise_seed = seed;
   options.landmarks = 1500;
   options.max_keypoints = 120;
-  options.sigma_px = kFeatures.sigma_px;
+  options.sigma_px = kPoseFeatures.sigma_px;
   map::SimulatedMap out(synthetic::FeatureSimulator(synthetic::ring_rig(2), synthetic::make_orbit({}), options));
   for (int i = 0; i < keyframes; ++i) out.add_keyframe(FrameId(i), 0.3 * i);
   return out;
@@ -37,7 +37,7 @@ Selection window(const map::BundledMap& map, int newest, int free, int fixed) {
 
 void adjust(const Selection& selection, const AdjustmentOptions& options, map::BundledMap& map) {
   map::MapDraft draft(std::make_shared<const map::BundledMap>(map));
-  ASSERT_TRUE(adjust_map(selection, options, kFeatures, draft));
+  ASSERT_TRUE(adjust_map(selection, options, kPoseFeatures, draft));
   map = std::move(draft).finish().result;
 }
 

@@ -28,7 +28,7 @@ struct Graph {
   std::vector<Edge> edges;
 };
 
-SE3 read_pose(std::istream& in) {
+SE3 read_node_pose(std::istream& in) {
   Eigen::Vector3d t;
   Eigen::Quaterniond q;
   in >> t.x() >> t.y() >> t.z() >> q.x() >> q.y() >> q.z() >> q.w();
@@ -44,14 +44,14 @@ Graph parse(const std::string& text) {
     int id = 0;
     in >> id;
     if (tag == "VERTEX_SE3:QUAT") {
-      graph.vertices[id] = read_pose(in);
+      graph.vertices[id] = read_node_pose(in);
     } else if (tag == "FIX") {
       graph.fixed.push_back(id);
     } else {
       EXPECT_EQ(tag, "EDGE_SE3:QUAT");
       Edge edge{id, 0, {}, {}};
       in >> edge.to;
-      edge.T_from_to = read_pose(in);
+      edge.T_from_to = read_node_pose(in);
       for (int row = 0; row < 6; ++row)
         for (int column = row; column < 6; ++column) {
           in >> edge.information(row, column);

@@ -10,10 +10,11 @@ namespace bslam::mapping {
 namespace {
 
 using map::SimulatedMap;
-const feature::FeatureModel kFeatures{.sigma_px = synthetic::FeatureSimulatorOptions().sigma_px, .pyramid = {}};
+const feature::FeatureModel kSimulatedFeatures{.sigma_px = synthetic::FeatureSimulatorOptions().sigma_px,
+                                               .pyramid = {}};
 constexpr KeyframeId kFirst(0), kSecond(1), kThird(2);
 
-synthetic::FeatureSimulator simulator(camera::Rig rig) {
+synthetic::FeatureSimulator walk_simulator(camera::Rig rig) {
   synthetic::FeatureSimulatorOptions options;
   options.landmarks = 3000;
   options.max_keypoints = 500;
@@ -23,7 +24,7 @@ synthetic::FeatureSimulator simulator(camera::Rig rig) {
 // Keyframes 0 and 1 share their landmarks; keyframe 2 has its own, so that landmarks visible in all three are in the
 // map twice.
 SimulatedMap doubled_map(camera::Rig rig) {
-  SimulatedMap world(simulator(std::move(rig)));
+  SimulatedMap world(walk_simulator(std::move(rig)));
   world.add_keyframe(FrameId(0), 0.0);
   world.add_keyframe(FrameId(1), 0.1);
   world.landmark_of.clear();
@@ -32,7 +33,7 @@ SimulatedMap doubled_map(camera::Rig rig) {
 }
 
 // Number of features of a keyframe that belong to a landmark.
-std::ptrdiff_t num_observed(const map::BundledMap& map, KeyframeId keyframe) {
+std::ptrdiff_t observed_landmarks(const map::BundledMap& map, KeyframeId keyframe) {
   return std::ranges::count_if(map.keyframe(keyframe).landmarks, &LandmarkId::valid);
 }
 
@@ -72,8 +73,8 @@ TEST_P(LandmarkFusion, AddsAnObservationAtAFreeFeature) {
     }
   }
   for (const auto& [l, feature] : lost) draft.remove_observation(l, kSecond);
-  const std::ptrdiff_t before = num_observed(draft.map(), kSecond);
-  fuse_into(kSecond, searched, Keep::kSearched, {}, kFeatures, draft);
+  const std::ptrdiff_t before = observed_landmarks(draft.map(), kSecond);
+  fuse_into(kSecond, searched, Keep::kSearched, {}, kSimulatedFeatures, draft);
   int back = 0, elsewhere = 0;
   for (const auto& [l, feature] : lost) back += draft.map().landmark_of(kSecond, feature) == l;
   for (const LandmarkId l : landmarks_of(draft.map(), kSecond)) {
@@ -85,7 +86,7 @@ TEST_P(LandmarkFusion, AddsAnObservationAtAFreeFeature) {
   }
   EXPECT_GT(back, static_cast<int>(0.85 * static_cast<double>(lost.size())));
   EXPECT_LE(elsewhere, back / 100);
-  EXPECT_GE(num_observed(draft.map(), kSecond) - before, back);
+  EXPECT_GE(observed_landmarks(draft.map(), kSecond) - before, back);
   EXPECT_EQ(draft.map().check_invariants(), std::nullopt);
 }
 
@@ -94,7 +95,7 @@ TEST_P(LandmarkFusion, MergesLandmarksMatchedToTheSameFeature) {
   const auto doubles = pairs(world, kSecond, kThird);
   ASSERT_GT(doubles.size(), 100u);
   map::MapDraft draft = world.draft();
-  fuse_into(kThird, landmarks_of(world.map, kSecond), Keep::kSearched, {}, kFeatures, draft);
+  fuse_into(kThird, landmarks_of(world.map, kSecond), Keep::kSearched, {}, kSimulatedFeatures, draft);
   int one = 0, wrong = 0;
   for (const auto& [l, m] : doubles) one += draft.map().resolve(l) == draft.map().resolve(m);
   for (const LandmarkId l : world.map.landmark_ids()) {
@@ -115,7 +116,7 @@ TEST_P(LandmarkFusion, KeepsTheLandmarkSelectedByTheArgument) {
   const SimulatedMap world = doubled_map(rig());
   const auto merged = [&](KeyframeId target, KeyframeId from, Keep keep) {
     map::MapDraft draft = world.draft();
-    fuse_into(target, landmarks_of(world.map, from), keep, {}, kFeatures, draft);
+    fuse_into(target, landmarks_of(world.map, from), keep, {}, kSimulatedFeatures, draft);
     int searched_died = 0, target_died = 0, less_observed_stayed = 0;
     for (const auto& [l, m] : pairs(world, from, target)) {
       if (draft.map().resolve(l) != draft.map().resolve(m)) continue;
@@ -139,7 +140,7 @@ TEST_P(LandmarkFusion, KeepsTheLandmarkSelectedByTheArgument) {
 TEST_P(LandmarkFusion, SkipsLandmarksThatTheKeyframeAlreadyObserves) {
   const SimulatedMap world = doubled_map(rig());
   map::MapDraft draft = world.draft();
-  fuse_into(kThird, landmarks_of(world.map, kThird), Keep::kSearched, {}, kFeatures, draft);
+  fuse_into(kThird, landmarks_of(world.map, kThird), Keep::kSearched, {}, kSimulatedFeatures, draft);
   EXPECT_TRUE(std::move(draft).finish().edit.operations.empty());
 }
 
@@ -149,7 +150,7 @@ TEST_P(LandmarkFusion, SkipsRemovedLandmarks) {
   const std::vector<LandmarkId> searched = landmarks_of(world.map, kSecond);
   for (const LandmarkId l : searched) draft.remove_landmark(l);
   const map::BundledMap before = draft.map();
-  fuse_into(kThird, searched, Keep::kSearched, {}, kFeatures, draft);
+  fuse_into(kThird, searched, Keep::kSearched, {}, kSimulatedFeatures, draft);
   EXPECT_EQ(draft.map().num_landmarks(), before.num_landmarks());
   EXPECT_EQ(draft.map().num_observations(), before.num_observations());
 }
@@ -168,9 +169,9 @@ TEST_P(LandmarkFusion, RejectsKeypointsFarFromTheProjection) {
   LandmarkFusionOptions options;
   options.radius = 0.012;
   map::MapDraft strict = world.draft(), lenient = world.draft();
-  fuse_into(kThird, searched, Keep::kSearched, options, kFeatures, strict);
+  fuse_into(kThird, searched, Keep::kSearched, options, kSimulatedFeatures, strict);
   const double chi2 = std::exchange(options.max_chi2, 1000);
-  fuse_into(kThird, searched, Keep::kSearched, options, kFeatures, lenient);
+  fuse_into(kThird, searched, Keep::kSearched, options, kSimulatedFeatures, lenient);
   EXPECT_GT(strict.map().num_landmarks(), lenient.map().num_landmarks() + 100);
   for (const LandmarkId l : landmarks_of(strict.map(), kThird)) {
     if (!std::ranges::binary_search(searched, l)) continue;
@@ -182,7 +183,7 @@ TEST_P(LandmarkFusion, RejectsKeypointsFarFromTheProjection) {
       const Eigen::Vector3d in_camera =
           cameras.cam_from_rig(r.camera) * (target.T_rig_world * strict.map().landmark(l).position);
       const feature::Keypoints& keypoints = target.frame->keypoints(r.camera);
-      const double sigma = kFeatures.sigma(keypoints.level[r.keypoint.index()]);
+      const double sigma = kSimulatedFeatures.sigma(keypoints.level[r.keypoint.index()]);
       const Eigen::Vector2d error =
           keypoints.pixel[r.keypoint.index()].cast<double>() - *cameras.camera(r.camera).project(in_camera);
       min_chi2 = std::min(min_chi2, error.squaredNorm() / (sigma * sigma));
@@ -195,12 +196,12 @@ INSTANTIATE_TEST_SUITE_P(Cameras, LandmarkFusion, ::testing::Values(1, 2, 4));
 
 // The rig has rotated by a right angle, so the left camera observes landmarks that the front cameras observed.
 TEST(LandmarkFusionAcrossCameras, MatchesLandmarksOfOtherCameras) {
-  SimulatedMap world(simulator(synthetic::default_rig()));
+  SimulatedMap world(walk_simulator(synthetic::default_rig()));
   world.add_keyframe(FrameId(0), 0.0);
   world.landmark_of.clear();
   world.add_keyframe(FrameId(1), 3.0);
   map::MapDraft draft = world.draft();
-  fuse_into(kSecond, landmarks_of(world.map, kFirst), Keep::kSearched, {}, kFeatures, draft);
+  fuse_into(kSecond, landmarks_of(world.map, kFirst), Keep::kSearched, {}, kSimulatedFeatures, draft);
   int across = 0;
   for (const LandmarkId l : landmarks_of(draft.map(), kSecond)) {
     const auto list = draft.map().observations(l);

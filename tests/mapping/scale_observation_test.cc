@@ -11,7 +11,7 @@ namespace bslam::mapping {
 namespace {
 
 using map::SimulatedMap;
-const FeatureModel kFeatures;
+const FeatureModel kDefaultFeatures;
 
 // One camera facing forward and two at 120 degrees to either side.
 camera::Rig three_sides() {
@@ -73,8 +73,8 @@ TEST(ObserveScale, DeviationAgreesWithTheErrors) {
     const SimulatedMap world = simulated_map(orbit(seed), three_sides(), 7, 1.0, seed);
     map::MapDraft draft = world.draft();
     // The adjustment moves the map from the truth to the optimum for the noisy pixels.
-    map_keyframe(KeyframeId(6), independent_noise(), kFeatures, draft);
-    const ScaleReport report = observe_scale(KeyframeId(6), independent_noise().scale, kFeatures, draft);
+    map_keyframe(KeyframeId(6), independent_noise(), kDefaultFeatures, draft);
+    const ScaleReport report = observe_scale(KeyframeId(6), independent_noise().scale, kDefaultFeatures, draft);
     ASSERT_TRUE(report.observed);
     const double z = (length_ratio(world, draft.map()) - 1.0) / report.deviation;
     EXPECT_LT(std::abs(z), 4.0) << "seed " << seed << ": " << length_ratio(world, draft.map()) << " +- "
@@ -89,13 +89,13 @@ TEST(ObserveScale, ConvergesFromThreeTimesTooLargeOrTooSmall) {
   for (const double factor : {1.0 / 3.0, 3.0}) {
     const SimulatedMap world = simulated_map(orbit(1), three_sides(), 8, factor, 1);
     map::MapDraft draft = world.draft();
-    map_keyframe(KeyframeId(7), independent_noise(), kFeatures, draft);
+    map_keyframe(KeyframeId(7), independent_noise(), kDefaultFeatures, draft);
     map::MapDraft measured = draft;
-    EXPECT_TRUE(observe_scale(KeyframeId(7), independent_noise().scale, kFeatures, measured).observed);
+    EXPECT_TRUE(observe_scale(KeyframeId(7), independent_noise().scale, kDefaultFeatures, measured).observed);
     EXPECT_EQ(draft.map().scale(), map::Scale::kUnobservable);  // a single measurement is not enough
     EXPECT_NEAR(length_ratio(world, draft.map()), 1.0, 0.05) << factor;
-    map_keyframe(KeyframeId(7), independent_noise(), kFeatures, draft);
-    map_keyframe(KeyframeId(7), independent_noise(), kFeatures, draft);
+    map_keyframe(KeyframeId(7), independent_noise(), kDefaultFeatures, draft);
+    map_keyframe(KeyframeId(7), independent_noise(), kDefaultFeatures, draft);
     EXPECT_EQ(draft.map().scale(), map::Scale::kMetric) << factor;
     EXPECT_LE(draft.map().scale_deviation(), 0.02);
     EXPECT_NEAR(length_ratio(world, draft.map()), 1.0, 3.5 * draft.map().scale_deviation()) << factor;
@@ -137,7 +137,7 @@ TEST(ObserveScale, BecomesMetricIfTheScalesOfAllSubmapsAreObservable) {
   const SimulatedMap world = with_older_submap(6);
   const KeyframeId newest = world.map.newest_keyframe();
   map::MapDraft draft = world.draft();
-  for (int i = 0; i < 3; ++i) map_keyframe(newest, independent_noise(), kFeatures, draft);
+  for (int i = 0; i < 3; ++i) map_keyframe(newest, independent_noise(), kDefaultFeatures, draft);
   EXPECT_EQ(draft.map().scale(), map::Scale::kMetric);
   ASSERT_EQ(draft.map().roots().size(), 2u);
   for (const KeyframeId root : draft.map().roots())
@@ -150,7 +150,7 @@ TEST(ObserveScale, IsUnobservableIfThatOfAnOlderSubmapIs) {
   const SimulatedMap world = with_older_submap(1);
   const KeyframeId newest = world.map.newest_keyframe();
   map::MapDraft draft = world.draft();
-  for (int i = 0; i < 3; ++i) map_keyframe(newest, independent_noise(), kFeatures, draft);
+  for (int i = 0; i < 3; ++i) map_keyframe(newest, independent_noise(), kDefaultFeatures, draft);
   EXPECT_EQ(draft.map().scale(), map::Scale::kUnobservable);
   EXPECT_NEAR(length_ratio(world, draft.map(), draft.map().roots().back()), 1.0, 0.05);
   EXPECT_LE(draft.map().scale_deviation(), 0.02);  // that of the newest submap
@@ -161,9 +161,9 @@ TEST(ObserveScale, IsUnobservableOnAStraightLine) {
     const SimulatedMap world = simulated_map(straight_line(), three_sides(), 12, 1.5, seed);
     map::MapDraft draft = world.draft();
     for (int i = 0; i < 2; ++i) {
-      map_keyframe(KeyframeId(11), independent_noise(), kFeatures, draft);
+      map_keyframe(KeyframeId(11), independent_noise(), kDefaultFeatures, draft);
       map::MapDraft measured = draft;
-      const ScaleReport report = observe_scale(KeyframeId(11), independent_noise().scale, kFeatures, measured);
+      const ScaleReport report = observe_scale(KeyframeId(11), independent_noise().scale, kDefaultFeatures, measured);
       EXPECT_TRUE(!report.observed || report.deviation > 0.1) << "seed " << seed << ": " << report.deviation;
     }
     EXPECT_EQ(draft.map().scale(), map::Scale::kUnobservable);
@@ -175,7 +175,7 @@ TEST(ObserveScale, DoesNotChangeMapsOfKnownOrArbitraryScale) {
   for (const map::Scale scale : {map::Scale::kMetric, map::Scale::kUpToScale}) {
     world.map.set_scale(scale);
     map::MapDraft draft = world.draft();
-    EXPECT_FALSE(observe_scale(KeyframeId(3), {}, kFeatures, draft).observed);
+    EXPECT_FALSE(observe_scale(KeyframeId(3), {}, kDefaultFeatures, draft).observed);
     EXPECT_EQ(draft.map().scale(), scale);
     EXPECT_EQ(draft.map().keyframe(KeyframeId(3)).T_rig_world.translation(),
               world.map.keyframe(KeyframeId(3)).T_rig_world.translation());
@@ -187,11 +187,12 @@ TEST(ObserveScale, ContradictsAWrongMetricScaleThatWasEstimatedFromMotion) {
     SimulatedMap world = simulated_map(orbit(1), three_sides(), 9, factor, 1);
     world.map.set_scale(map::Scale::kMetric, 0.01);
     map::MapDraft draft = world.draft();
-    const ScaleReport report = observe_scale(KeyframeId(8), independent_noise().scale, kFeatures, draft);
+    const ScaleReport report = observe_scale(KeyframeId(8), independent_noise().scale, kDefaultFeatures, draft);
     EXPECT_EQ(report.correction > 1.5, factor < 1.0) << factor;
     EXPECT_EQ(draft.map().scale(), factor < 1.0 ? map::Scale::kUnobservable : map::Scale::kMetric);
     map::MapDraft mapped = world.draft();
-    map_keyframe(KeyframeId(8), independent_noise(), kFeatures, mapped);  // a single estimate does not make it metric
+    map_keyframe(KeyframeId(8), independent_noise(), kDefaultFeatures,
+                 mapped);  // a single estimate does not make it metric
     EXPECT_EQ(mapped.map().scale(), factor < 1.0 ? map::Scale::kUnobservable : map::Scale::kMetric);
     EXPECT_NEAR(length_ratio(world, mapped.map()), 1.0, 0.1) << factor;
   }
@@ -200,10 +201,10 @@ TEST(ObserveScale, ContradictsAWrongMetricScaleThatWasEstimatedFromMotion) {
 TEST(ObserveScale, IsUnobservableWithOneCameraOrOneKeyframe) {
   const SimulatedMap one = simulated_map(orbit(1), synthetic::ring_rig(1), 5, 1.5, 1);
   map::MapDraft draft = one.draft();
-  EXPECT_FALSE(observe_scale(KeyframeId(4), {}, kFeatures, draft).observed);
+  EXPECT_FALSE(observe_scale(KeyframeId(4), {}, kDefaultFeatures, draft).observed);
   const SimulatedMap first = simulated_map(orbit(1), three_sides(), 1, 1.5, 1);
   map::MapDraft start = first.draft();
-  EXPECT_FALSE(observe_scale(KeyframeId(0), {}, kFeatures, start).observed);
+  EXPECT_FALSE(observe_scale(KeyframeId(0), {}, kDefaultFeatures, start).observed);
 }
 
 TEST(SelectSubmap, FreesAllExceptTheRootWhileTheScaleIsUnknown) {

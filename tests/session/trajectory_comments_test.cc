@@ -7,7 +7,7 @@ namespace {
 
 using evaluation::PoseState;
 
-RunFrame frame(double time_s, tracking::LostReason reason = tracking::LostReason::kNone) {
+RunFrame timed_frame(double time_s, tracking::LostReason reason = tracking::LostReason::kNone) {
   tracking::FrameRecord record;
   const bool tracked = reason == tracking::LostReason::kNone;
   record.result.status = tracked ? tracking::TrackStatus::kTracking : tracking::TrackStatus::kLost;
@@ -23,7 +23,7 @@ const std::vector<KeyframeId> kRoots = {KeyframeId(0), KeyframeId(12), KeyframeI
 
 TEST(TrajectoryComments, ARunWithoutLossesHasItsHeaderOnly) {
   RunRecord record;
-  record.frames = {frame(0), frame(0.05)};
+  record.frames = {timed_frame(0), timed_frame(0.05)};
   const std::vector<system::SubmapTrajectory> one = {submap(2, false)};
   EXPECT_EQ(trajectory_comments(record, one, 0, PoseState::kFinal, kRoots),
             "bslam trajectory frame=cam0 parent=world final=true");
@@ -33,7 +33,7 @@ TEST(TrajectoryComments, ARunWithoutLossesHasItsHeaderOnly) {
 
 TEST(TrajectoryComments, NameTheCameraOfTheRunAndAScaleThatIsNotMetric) {
   RunRecord record;
-  record.frames = {frame(0)};
+  record.frames = {timed_frame(0)};
   record.cameras_used = {2, 0};
   record.cameras = {{.name = "right", .states = {}}, {.name = "left", .states = {}}};
   record.map.scale = "up-to-scale";
@@ -55,8 +55,8 @@ TEST(TrajectoryComments, NameTheCameraOfTheRunAndAScaleThatIsNotMetric) {
 
 TEST(TrajectoryComments, NameSubmapsAndLosses) {
   RunRecord record;
-  record.frames = {frame(0), frame(0.05, tracking::LostReason::kFewMatches),
-                   frame(0.1, tracking::LostReason::kFewMatches), frame(0.15), frame(0.2)};
+  record.frames = {timed_frame(0), timed_frame(0.05, tracking::LostReason::kFewMatches),
+                   timed_frame(0.1, tracking::LostReason::kFewMatches), timed_frame(0.15), timed_frame(0.2)};
   const std::vector<system::SubmapTrajectory> two = {submap(2, false), submap(1, false, 30)};
   EXPECT_EQ(
       trajectory_comments(record, two, 0, PoseState::kFinal, kRoots),
@@ -71,7 +71,7 @@ TEST(TrajectoryComments, NameSubmapsAndLosses) {
 // The largest submap, that of trajectory.tum, need not be the first one of the map; and one may have been merged.
 TEST(TrajectoryComments, NumberSubmapsAsTheMapDoes) {
   RunRecord record;
-  record.frames = {frame(0), frame(0.05), frame(0.1)};
+  record.frames = {timed_frame(0), timed_frame(0.05), timed_frame(0.1)};
   const std::vector<system::SubmapTrajectory> live = {submap(2, false, 12), submap(1, false, 0), submap(1, false, 7)};
   const auto comments = [&](std::size_t index) {
     return trajectory_comments(record, live, index, PoseState::kLive, kRoots);
@@ -85,7 +85,7 @@ TEST(TrajectoryComments, NumberSubmapsAsTheMapDoes) {
 
 TEST(TrajectoryComments, SayWhetherPosesAreInTheLoadedMap) {
   RunRecord record;
-  record.frames = {frame(0)};
+  record.frames = {timed_frame(0)};
   record.map.loaded = true;
   EXPECT_EQ(trajectory_comments(record, std::vector{submap(1, true)}, 0, PoseState::kFinal, kRoots),
             "bslam trajectory frame=cam0 parent=world final=true\n# in the world frame of the loaded map");
