@@ -37,10 +37,7 @@ solver::ShiftPrior prior_of(const frame::BundledFrame& frame, std::span<const do
   solver::ShiftPrior out(variances.size());
   const std::size_t reference = frame::reference_camera(frame);
   for (std::size_t c = 0; c < variances.size(); ++c) {
-    if (c == reference || variances[c] <= 0) continue;
-    const auto i = static_cast<Eigen::Index>(c);
-    out.information(i) = 1 / variances[c];
-    out.mean_s(i) = -to_seconds(frame.cameras[c].correction_ns);
+    if (c != reference && variances[c] > 0) out.set(c, variances[c], to_seconds(frame.cameras[c].correction_ns));
   }
   return out;
 }

@@ -9,15 +9,22 @@
 
 namespace bslam::solver {
 
-// Normal distributions of the shifts of all cameras: means in seconds, inverse variances in 1/s^2.
+// Normal distributions of the shifts of all cameras: means in seconds, inverse variances in 1/s^2. At first all shifts
+// are zero.
 struct ShiftPrior {
   Eigen::VectorXd mean_s, information;
 
   explicit ShiftPrior(std::size_t cameras)
       : mean_s(Eigen::VectorXd::Zero(static_cast<Eigen::Index>(cameras))),
         information(Eigen::VectorXd::Constant(static_cast<Eigen::Index>(cameras), kExact)) {}
-  static constexpr double kExact = 1e14;   // a deviation of 0.1 microseconds
-  static constexpr double kUnknown = 1.0;  // a deviation of a second
+  // The shift of a camera has this variance about zero, and `corrected_s` of it is part of the capture times already.
+  void set(std::size_t camera, double variance_s2, double corrected_s = 0) {
+    mean_s(static_cast<Eigen::Index>(camera)) = -corrected_s;
+    information(static_cast<Eigen::Index>(camera)) = 1 / variance_s2;
+  }
+
+  static constexpr double kExact = 1e14;      // a deviation of 0.1 microseconds
+  static constexpr double kUnknown_s2 = 1.0;  // variance of a shift of which nothing is known
 };
 
 // The left perturbation of T_rig_world, and the shifts with their variances.

@@ -156,6 +156,20 @@ std::vector<solver::PoseObservation> pose_observations(const map::BundledMap& ma
 }
 
 std::vector<solver::PoseObservation> pose_observations(const map::BundledMap& map, const frame::BundledFrame& frame,
+                                                       const FrameMatches& matches) {
+  std::vector<solver::PoseObservation> out;
+  for (std::size_t c = 0; c < matches.size(); ++c) {
+    const feature::Keypoints& keypoints = frame.cameras[c].keypoints;
+    for (const Match& m : matches[c]) {
+      const std::size_t k = m.keypoint.index();
+      out.push_back({CameraIndex(c), map.landmark(m.landmark).position, keypoints.pixel[k].cast<double>(),
+                     static_cast<double>(keypoints.sigma[k])});
+    }
+  }
+  return out;
+}
+
+std::vector<solver::PoseObservation> pose_observations(const map::BundledMap& map, const frame::BundledFrame& frame,
                                                        const FrameMatches& matches,
                                                        const feature::FeatureModel& features) {
   std::vector<solver::PoseObservation> out;

@@ -80,6 +80,10 @@ frame::BundledFrame refined(const frame::BundledFrame& frame, const FrameMatches
 // Observations for the pose solver, camera by camera in the order of `matches`, at the aligned positions.
 std::vector<solver::PoseObservation> pose_observations(const map::BundledMap& map, const FrameMatches& matches,
                                                        const AlignedMatches& aligned);
+// Observations at the positions in the frame, with the standard deviations of its keypoints: those of a frame that was
+// refined.
+std::vector<solver::PoseObservation> pose_observations(const map::BundledMap& map, const frame::BundledFrame& frame,
+                                                       const FrameMatches& matches);
 // Observations before alignment, with the detector's standard deviation. (The standard deviation stored with a keypoint
 // applies between the cameras of its frame, not to the map.)
 std::vector<solver::PoseObservation> pose_observations(const map::BundledMap& map, const frame::BundledFrame& frame,

@@ -27,24 +27,8 @@ bool wrong(const StampErrors& stamps) { return stamps.variance_s2 > kExact_s2; }
 ShiftPrior prior_of(const frame::BundledFrame& frame, std::size_t reference, std::span<const StampErrors> stamps) {
   ShiftPrior out(frame.cameras.size());
   for (std::size_t c = 0; c < frame.cameras.size(); ++c) {
-    if (c == reference || !wrong(stamps[c])) continue;
-    const auto i = static_cast<Eigen::Index>(c);
-    out.information(i) = 1 / stamps[c].variance_s2;
-    out.mean_s(i) = -to_seconds(frame.cameras[c].correction_ns);
-  }
-  return out;
-}
-
-std::vector<solver::PoseObservation> observations_of(const map::BundledMap& map, const frame::BundledFrame& frame,
-                                                     const FrameMatches& inliers) {
-  std::vector<solver::PoseObservation> out;
-  for (std::size_t c = 0; c < inliers.size(); ++c) {
-    const feature::Keypoints& keypoints = frame.cameras[c].keypoints;
-    for (const Match& m : inliers[c]) {
-      const std::size_t k = m.keypoint.index();
-      out.push_back({CameraIndex(c), map.landmark(m.landmark).position, keypoints.pixel[k].cast<double>(),
-                     static_cast<double>(keypoints.sigma[k])});
-    }
+    if (c != reference && wrong(stamps[c]))
+      out.set(c, stamps[c].variance_s2, to_seconds(frame.cameras[c].correction_ns));
   }
   return out;
 }
@@ -109,9 +93,9 @@ void update_stamp_errors(const map::BundledMap& map, const frame::BundledFrame& 
   const std::size_t reference = frame::reference_camera(frame);
   ShiftPrior prior(cameras);
   for (std::size_t c = 0; c < cameras; ++c) {
-    if (c != reference) prior.information(static_cast<Eigen::Index>(c)) = ShiftPrior::kUnknown;
+    if (c != reference) prior.set(c, ShiftPrior::kUnknown_s2);
   }
-  const auto found = solver::time_shift_step(frame::rig_of(map.rig(), frame), observations_of(map, frame, inliers),
+  const auto found = solver::time_shift_step(frame::rig_of(map.rig(), frame), pose_observations(map, frame, inliers),
                                              T_rig_world, frame.twist, prior);
   for (std::size_t c = 0; c < cameras; ++c) {
     const auto i = static_cast<Eigen::Index>(c);

@@ -32,11 +32,6 @@ SimulatedMap doubled_map(camera::Rig rig) {
   return world;
 }
 
-// Number of features of a keyframe that belong to a landmark.
-std::ptrdiff_t observed_landmarks(const map::BundledMap& map, KeyframeId keyframe) {
-  return std::ranges::count_if(map.keyframe(keyframe).landmarks, &LandmarkId::valid);
-}
-
 int truth_of(const SimulatedMap& world, LandmarkId l) { return world.truth_of_landmark.at(l.value()); }
 
 // Returns the pairs of landmarks of `a` and of `b` that are the same landmark of the simulator.
@@ -73,7 +68,7 @@ TEST_P(LandmarkFusion, AddsAnObservationAtAFreeFeature) {
     }
   }
   for (const auto& [l, feature] : lost) draft.remove_observation(l, kSecond);
-  const std::ptrdiff_t before = observed_landmarks(draft.map(), kSecond);
+  const std::ptrdiff_t before = num_observed(draft.map(), kSecond);
   fuse_into(kSecond, searched, Keep::kSearched, {}, kSimulatedFeatures, draft);
   int back = 0, elsewhere = 0;
   for (const auto& [l, feature] : lost) back += draft.map().landmark_of(kSecond, feature) == l;
@@ -86,7 +81,7 @@ TEST_P(LandmarkFusion, AddsAnObservationAtAFreeFeature) {
   }
   EXPECT_GT(back, static_cast<int>(0.85 * static_cast<double>(lost.size())));
   EXPECT_LE(elsewhere, back / 100);
-  EXPECT_GE(observed_landmarks(draft.map(), kSecond) - before, back);
+  EXPECT_GE(num_observed(draft.map(), kSecond) - before, back);
   EXPECT_EQ(draft.map().check_invariants(), std::nullopt);
 }
 

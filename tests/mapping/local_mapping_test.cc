@@ -135,11 +135,6 @@ TEST(CreateLandmarks, CreatesNoneWithZeroNeighbours) {
   EXPECT_EQ(single.free_keyframes.size(), 1u);
 }
 
-// Number of features of a keyframe that belong to a landmark.
-std::ptrdiff_t num_observed(const map::BundledMap& map, KeyframeId keyframe) {
-  return std::ranges::count_if(map.keyframe(keyframe).landmarks, &LandmarkId::valid);
-}
-
 class FuseLandmarks : public ::testing::Test {
  protected:
   // A map in which every keyframe has its own landmarks, so that every landmark shared by two keyframes is duplicated.

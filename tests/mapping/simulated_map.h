@@ -117,4 +117,9 @@ inline double angle_rad(const geometry::SE3& a, const geometry::SE3& b) {
   return a.rotation().angularDistance(b.rotation());
 }
 
+// Number of features of a keyframe that belong to a landmark.
+inline std::ptrdiff_t num_observed(const BundledMap& map, KeyframeId keyframe) {
+  return std::ranges::count_if(map.keyframe(keyframe).landmarks, &LandmarkId::valid);
+}
+
 }  // namespace bslam::map

@@ -32,7 +32,7 @@ ShiftedScene make_shifted_scene(const Rig& rig, const std::vector<double>& shift
 // Unknown shifts of all cameras but the first.
 ShiftPrior unknown(std::size_t cameras) {
   ShiftPrior out(cameras);
-  out.information.tail(out.information.size() - 1).setConstant(ShiftPrior::kUnknown);
+  for (std::size_t c = 1; c < cameras; ++c) out.set(c, ShiftPrior::kUnknown_s2);
   return out;
 }
 
@@ -73,8 +73,7 @@ TEST(TimeShifts, ThePriorHoldsWhereTheRigIsAtRest) {
   Random random(5, "shifts");
   const ShiftedScene s = make_shifted_scene(rig, {0, 0}, 1.0, random);
   ShiftPrior prior(2);
-  prior.mean_s(1) = 0.003;
-  prior.information(1) = 1e6;
+  prior.set(1, 1e-6, -0.003);
   const ShiftStep found = time_shift_step(rig, s.observations, s.seen.T_rig_world, Vector6d::Zero(), prior);
   EXPECT_NEAR(found.shift_s(0), 0.0, 1e-7);
   EXPECT_NEAR(found.shift_s(1), 0.003, 1e-9);
@@ -86,7 +85,7 @@ TEST(TimeShifts, AConstantPoseStaysAndItsShiftsAreFound) {
   Random random(6, "shifts");
   const ShiftedScene s = make_shifted_scene(rig, {0.003, -0.002, 0.001}, 0.0, random);
   ShiftPrior prior(3);
-  prior.information.setConstant(ShiftPrior::kUnknown);
+  for (std::size_t c = 0; c < 3; ++c) prior.set(c, ShiftPrior::kUnknown_s2);
   const ShiftStep found = time_shift_step(rig, s.observations, s.seen.T_rig_world, s.twist, prior, false);
   EXPECT_TRUE(found.pose.isZero(0));
   EXPECT_NEAR(found.shift_s(0), 0.003, 2e-4);

@@ -187,7 +187,7 @@ TEST_F(TrackedFrame, InformationEqualsThatOfThePoseSolver) {
   ASSERT_EQ(information.size(), 4u);
   Matrix6d all = Matrix6d::Zero();
   for (const Matrix6d& i : information) all += i;
-  const auto observations = observations_of(world.map, frame, output.matches);
+  const auto observations = pose_observations(world.map, frame, output.matches);
   solver::PoseSolverOptions accept_all;
   const auto solution =
       solver::solve_pose(frame::rig_of(world.map.rig(), frame), observations, output.result.T_rig_world, accept_all);

@@ -74,21 +74,6 @@ class SimulatedTracker {
   ThreadPool pool_;
 };
 
-// Observations of the matched keypoints at their positions in the frame, each with its own standard deviation.
-inline std::vector<solver::PoseObservation> observations_of(const map::BundledMap& map,
-                                                            const frame::BundledFrame& frame,
-                                                            const FrameMatches& matches) {
-  std::vector<solver::PoseObservation> out;
-  for (std::size_t c = 0; c < matches.size(); ++c) {
-    const feature::Keypoints& k = frame.cameras[c].keypoints;
-    for (const Match& m : matches[c]) {
-      const std::size_t i = m.keypoint.index();
-      out.push_back({CameraIndex(c), map.landmark(m.landmark).position, k.pixel[i].cast<double>(), k.sigma[i]});
-    }
-  }
-  return out;
-}
-
 // Moves a fraction of the keypoints by up to 25 pixels without changing their descriptors.
 inline void displace_keypoints(const camera::Rig& rig, double fraction, Random random, frame::BundledFrame& frame) {
   for (std::size_t c = 0; c < frame.cameras.size(); ++c) {

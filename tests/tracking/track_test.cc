@@ -23,7 +23,7 @@ struct RigCase {
 double squared_normalised_error(const map::BundledMap& map, const frame::BundledFrame& frame,
                                 const FrameMatches& matches, const SE3& T_rig_world, const SE3& true_T_rig_world) {
   geometry::Matrix6d information = geometry::Matrix6d::Zero();
-  for (const solver::PoseObservation& o : observations_of(map, frame, matches)) {
+  for (const solver::PoseObservation& o : pose_observations(map, frame, matches)) {
     const Eigen::Vector3d p = true_T_rig_world * o.point_world;
     const SE3& T_cam_rig = map.rig().cam_from_rig(o.camera);
     const auto projection = map.rig().camera(o.camera).project_with_jacobian(T_cam_rig * p);
