@@ -47,6 +47,7 @@ class Browser:
         self.socket.sendall((f'GET /live?token={view.token if token is None else token} HTTP/1.1\r\nHost: {host}\r\n{origin}Upgrade: websocket\r\n'
                              f'Connection: Upgrade\r\nSec-WebSocket-Key: {key}\r\nSec-WebSocket-Version: 13\r\n\r\n').encode())
         self.pending = b''
+        self.received = {}  # the newest value of each channel
         head = self._until(b'\r\n\r\n')
         self.status = int(head.split()[1])
 
@@ -101,8 +102,13 @@ class Browser:
                 raise ConnectionError(message)
             if confirm or message['channel'] != channel:
                 self.send(f'got {message["channel"]}')
+            self.received[message['channel']] = message['value']
             if message['channel'] == channel:
                 return message['value']
+
+    def newest(self, channel):
+        """The newest value of a channel so far, or its first. A paused run sends none after it."""
+        return self.received[channel] if channel in self.received else self.next(channel)
 
     def state(self, wanted):
         """Reads until the state has the wanted values."""

@@ -109,7 +109,7 @@ class LiveView(unittest.TestCase):
             self.assertGreater(len(pixels), 10)
             self.assertTrue(all(-1 <= u <= camera['width'] for u in pixels[::2]))
             self.assertTrue(all(-1 <= v <= camera['height'] for v in pixels[1::2]))
-        run = browser.next('run')
+        run = browser.newest('run')
         self.assertTrue(run['live'])
         self.assertGreater(run['landmarks'], 100)
         self.assertEqual(run['submaps'][0]['root'], frame['pose']['root'])
