@@ -4,8 +4,8 @@ RPE where frames are equidistant, so that evo's pairs of frames and our pairs of
 
     evo_cross_check.py BSLAM [--venv DIR]
 
-evo is installed into a virtual environment (DIR is kept and used again; default: a temporary one) and run as a program of
-its own. Exit 0: all figures agree to 1e-6; 1: some do not; 77: skipped, evo cannot be had.
+evo is installed into a virtual environment (DIR is kept and used again; default: a temporary one). Its commands run in one
+process of their own, since most of the time of a command is that of its start. Exit 0: all figures agree to 1e-6; 1: some do not; 77: skipped, evo cannot be had.
 """
 import argparse
 import json
@@ -95,13 +95,39 @@ def install_evo(venv):
     return None
 
 
-def evo_rmse(venv, tool, folder, *options):
-    result = folder / 'result.zip'
-    result.unlink(missing_ok=True)
-    p = subprocess.run([str(venv / 'bin' / tool), 'tum', str(folder / 'gt.tum'), str(folder / 'est.tum'), '--t_max_diff',
-                        '0.01', '--save_results', str(result), '--no_warnings', *options], capture_output=True, text=True)
-    if p.returncode != 0:
-        sys.exit(f'{tool} failed: {p.stderr or p.stdout}')
+# Runs the commands on standard input, a list of lists of arguments, as the installed programs would.
+RUN_COMMANDS = """
+import importlib.metadata, json, sys
+programs = {e.name: e for e in importlib.metadata.entry_points(group='console_scripts')}
+for sys.argv in json.load(sys.stdin):
+    try:
+        programs[sys.argv[0]].load()()
+    except SystemExit as end:
+        if end.code:
+            sys.exit(f'{sys.argv} failed: {end.code}')
+"""
+
+
+class EvoCommands:
+    """Commands of evo, which run together."""
+
+    def __init__(self):
+        self.commands = []
+
+    def add(self, tool, folder, *options):
+        """The file in which the statistics of `folder` will be."""
+        result = folder / f'{len(self.commands)}.zip'
+        self.commands.append([tool, 'tum', str(folder / 'gt.tum'), str(folder / 'est.tum'), '--t_max_diff', '0.01', '--save_results',
+                              str(result), '--no_warnings', *options])
+        return result
+
+    def run(self, venv):
+        p = subprocess.run([str(python_of(venv)), '-c', RUN_COMMANDS], input=json.dumps(self.commands), capture_output=True, text=True)
+        if p.returncode != 0:
+            sys.exit(f'evo failed: {p.stderr or p.stdout}')
+
+
+def statistics(result):
     with zipfile.ZipFile(result) as z:
         return json.loads(z.read('stats.json'))
 
@@ -129,32 +155,41 @@ def main():
         return compare(arguments.bslam, venv, folder)
 
 
-def compare(bslam, venv, folder):
-    worst = 0.0
+ALIGNMENTS = {'none': [], 'se3': ['--align'], 'sim3': ['--align', '--correct_scale']}
 
-    def row(name, ours, theirs):
-        nonlocal worst
-        difference = abs(ours - theirs)
-        worst = max(worst, difference if difference == difference else math.inf)
-        print(f'{name:<44}{ours:14.9f}{theirs:14.9f}   {difference:.1e}{"" if difference < TOLERANCE else "   DIFFERS"}')
 
-    alignments = {'none': [], 'se3': ['--align'], 'sim3': ['--align', '--correct_scale']}
-    print(f'{"":<44}{"bslam":>14}{"evo":>14}   difference')
+def figures(bslam, folder, evo):
+    """Yields (name, our figure, file with evo's statistics, name of the statistic)."""
     for name, truth, estimate, equidistant in cases():
-        write_tum(folder / 'gt.tum', truth)
-        write_tum(folder / 'est.tum', estimate)
-        for align, options in alignments.items():
-            ours = our_figures(bslam, folder, align)
-            theirs = evo_rmse(venv, 'evo_ape', folder, *options)
+        data = folder / name.replace(' ', '_')
+        data.mkdir()
+        write_tum(data / 'gt.tum', truth)
+        write_tum(data / 'est.tum', estimate)
+        for align, options in ALIGNMENTS.items():
+            ours = our_figures(bslam, data, align)
+            theirs = evo.add('evo_ape', data, *options)
             for key in ('rmse', 'mean', 'median', 'max'):
-                row(f'{name}, {align}: ATE {key}', ours['ate'][key], theirs[key])
+                yield f'{name}, {align}: ATE {key}', ours['ate'][key], theirs, key
             if not equidistant:
                 continue
             pairs = ['--delta', str(FRAME_HZ), '--delta_unit', 'f', '--all_pairs', *options]
-            row(f'{name}, {align}: RPE translation', ours['rpe']['trans_rmse'],
-                evo_rmse(venv, 'evo_rpe', folder, '--pose_relation', 'trans_part', *pairs)['rmse'])
-            row(f'{name}, {align}: RPE rotation', ours['rpe']['rot_rmse_deg'],
-                evo_rmse(venv, 'evo_rpe', folder, '--pose_relation', 'angle_deg', *pairs)['rmse'])
+            yield (f'{name}, {align}: RPE translation', ours['rpe']['trans_rmse'],
+                   evo.add('evo_rpe', data, '--pose_relation', 'trans_part', *pairs), 'rmse')
+            yield (f'{name}, {align}: RPE rotation', ours['rpe']['rot_rmse_deg'],
+                   evo.add('evo_rpe', data, '--pose_relation', 'angle_deg', *pairs), 'rmse')
+
+
+def compare(bslam, venv, folder):
+    evo = EvoCommands()
+    rows = list(figures(bslam, folder, evo))
+    evo.run(venv)
+    worst = 0.0
+    print(f'{"":<44}{"bslam":>14}{"evo":>14}   difference')
+    for name, ours, result, key in rows:
+        theirs = statistics(result)[key]
+        difference = abs(ours - theirs)
+        worst = max(worst, difference if difference == difference else math.inf)
+        print(f'{name:<44}{ours:14.9f}{theirs:14.9f}   {difference:.1e}{"" if difference < TOLERANCE else "   DIFFERS"}')
     print(f'largest difference {worst:.1e}, allowed {TOLERANCE:.0e}')
     return 0 if worst < TOLERANCE else 1
 
