@@ -48,7 +48,7 @@ void run(const RenderedTour& tour, System& system) {
 }
 
 TEST(SystemCalibration, ReportsTheRotatedCameraAndKeepsTheGivenExtrinsics) {
-  const RenderedTour tour(4, 40);
+  const RenderedTour& tour = rendered_tour(4, 40);
   const camera::Rig wrong = rotated(tour.rig(), 2);
   System system(wrong, with_exact_intrinsics(calibration::Refine::kFalse));
   run(tour, system);
@@ -57,7 +57,7 @@ TEST(SystemCalibration, ReportsTheRotatedCameraAndKeepsTheGivenExtrinsics) {
 }
 
 TEST(SystemCalibration, UsesTheRefinedExtrinsicsForTheMap) {
-  const RenderedTour tour(4, 40);
+  const RenderedTour& tour = rendered_tour(4, 40);
   System system(rotated(tour.rig(), 2), with_exact_intrinsics(calibration::Refine::kTrue));
   run(tour, system);
   EXPECT_TRUE(system.calibration_refined());
@@ -71,7 +71,7 @@ TEST(SystemCalibration, UsesTheRefinedExtrinsicsForTheMap) {
 }
 
 TEST(SystemCalibration, SequentialAndLaggedRunsRepeatTheirPoses) {
-  const RenderedTour tour(4, 40);
+  const RenderedTour& tour = rendered_tour(4, 40);
   for (const execution::Mode mode : {execution::Mode::kSequential, execution::Mode::kLagged}) {
     std::vector<SubmapTrajectory> first;
     for (int repeat = 0; repeat < 2; ++repeat) {
@@ -95,7 +95,7 @@ TEST(SystemCalibration, SequentialAndLaggedRunsRepeatTheirPoses) {
 }
 
 TEST(SystemCalibration, ReportsNothingIfDisabled) {
-  const RenderedTour tour(2, 16);
+  const RenderedTour& tour = rendered_tour(2, 16);
   Config config = small_config(execution::Mode::kSequential);
   config.calibration.check = false;
   config.calibration.refine = calibration::Refine::kFalse;
@@ -109,7 +109,7 @@ TEST(SystemCalibration, ReportsNothingIfDisabled) {
 // The two cameras share no feature within the tolerance of the calibration, so that the map could not be started with
 // metric scale.
 TEST(SystemCalibration, ARotatedPairIsCorrectedBeforeTheStart) {
-  const RenderedTour tour(2, 20);
+  const RenderedTour& tour = rendered_tour(2, 20);
   geometry::Vector6d turn = geometry::Vector6d::Zero();
   turn[0] = 3 * kDegree;  // across the epipolar planes
   const camera::Rig& rig = tour.rig();

@@ -6,7 +6,7 @@ namespace bslam::system {
 namespace {
 
 TEST(SystemLagged, IsDeterministicWithAnyNumberOfThreads) {
-  const RenderedTour tour(4, 16);
+  const RenderedTour& tour = rendered_tour(4, 16);
   evaluation::Trajectory final, live;
   std::string journal;
   for (const int threads : {1, 1, 2, 4}) {
@@ -28,7 +28,7 @@ TEST(SystemLagged, IsDeterministicWithAnyNumberOfThreads) {
 }
 
 TEST(SystemLagged, CanBeDestroyedAtAnyFrameParallel) {
-  const RenderedTour tour(2, 12);
+  const RenderedTour& tour = rendered_tour(2, 12);
   for (std::size_t end = 0; end <= tour.frames().size(); ++end) {
     System system(tour.rig(), small_config(execution::Mode::kLagged));
     for (std::size_t k = 0; k < end; ++k) must_process(system, tour.frames()[k]);

@@ -9,7 +9,7 @@ namespace bslam::system {
 namespace {
 
 TEST(SystemParallel, TracksAllFramesAsWellAsSequential) {
-  const RenderedTour tour(4, 16);
+  const RenderedTour& tour = rendered_tour(4, 16);
   System system(tour.rig(), small_config(execution::Mode::kParallel));
   for (const image::ImageBundle& images : tour.frames()) must_process(system, images);
   system.finish();
@@ -26,7 +26,7 @@ TEST(SystemParallel, TracksAllFramesAsWellAsSequential) {
 }
 
 TEST(SystemParallel, CanBeDestroyedAtAnyFrame) {
-  const RenderedTour tour(2, 12);
+  const RenderedTour& tour = rendered_tour(2, 12);
   for (std::size_t end = 0; end <= tour.frames().size(); ++end) {
     System system(tour.rig(), small_config(execution::Mode::kParallel));
     for (std::size_t k = 0; k < end; ++k) must_process(system, tour.frames()[k]);
@@ -35,7 +35,7 @@ TEST(SystemParallel, CanBeDestroyedAtAnyFrame) {
 }
 
 TEST(SystemParallel, WaitsAtMostForAPendingKeyframe) {
-  const RenderedTour tour(2, 12);
+  const RenderedTour& tour = rendered_tour(2, 12);
   Config config = small_config(execution::Mode::kParallel);
   config.execution.max_pending_keyframes = 1;
   config.tracking.keyframe.min_interval = 1;
@@ -48,7 +48,7 @@ TEST(SystemParallel, WaitsAtMostForAPendingKeyframe) {
 }
 
 TEST(SystemParallel, VersionsOfTheMapAreConsistentForReadersInOtherThreads) {
-  const RenderedTour tour(2, 12);
+  const RenderedTour& tour = rendered_tour(2, 12);
   System system(tour.rig(), small_config(execution::Mode::kParallel));
   must_process(system, tour.frames()[0]);
   std::atomic<bool> done = false;
@@ -69,7 +69,7 @@ TEST(SystemParallel, VersionsOfTheMapAreConsistentForReadersInOtherThreads) {
 }
 
 TEST(SystemParallel, DiscardsANewMapUpToScaleThatIsLost) {
-  const RenderedTour tour(1, 12);
+  const RenderedTour& tour = rendered_tour(1, 12);
   System system(tour.rig(), small_config(execution::Mode::kParallel));
   std::size_t k = 0;
   while (k < 8 && tracked_frames(system) == 0) must_process(system, tour.frames()[k++]);

@@ -7,8 +7,10 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <map>
 #include <numbers>
 #include <numeric>
+#include <utility>
 #include <vector>
 
 #include "evaluation/trajectory_error.h"
@@ -37,11 +39,12 @@ class RenderedTour {
       : RenderedTour(late(first_cameras(cameras), late_ns), frames, motion) {}
 
   RenderedTour(camera::Rig rig, std::size_t frames, const Motion& motion)
-      : pool_(2), rig_(std::move(rig)), rig_truth_(rig_.size()) {
+      : rig_(std::move(rig)), rig_truth_(rig_.size()) {
+    ThreadPool pool(2);
     const simulator::World world(simulator::make_building(3), {.texel = 0.02, .light_texel = 0.8, .ambient_rays = 2},
-                                 pool_);
+                                 pool);
     const simulator::RecordingOptions options{.duration_s = static_cast<double>(frames) / kRateHz, .rate_hz = kRateHz};
-    const simulator::Recorder recorder(world, rig_, motion(world.building(), options.duration_s), {}, 0.002, pool_);
+    const simulator::Recorder recorder(world, rig_, motion(world.building(), options.duration_s), {}, 0.002, pool);
     const std::vector<simulator::Shot> shots = simulator::plan_shots(rig_, options);
     frames_.resize(frames);
     for (std::size_t k = 0; k < frames; ++k) {
@@ -49,7 +52,7 @@ class RenderedTour {
       frames_[k].time_ns = simulator::frame_stamp(options, k);
       frames_[k].images.resize(rig_.size());
     }
-    pool_.for_each(shots.size(), [&](std::size_t i) {
+    pool.for_each(shots.size(), [&](std::size_t i) {
       const simulator::Shot& shot = shots[i];
       const TimeNs time_ns = shot.stamp_ns + rig_.camera(shot.camera).time_offset_ns;
       frames_[shot.frame].images[shot.camera] = {image::ImageState::kPresent, time_ns, recorder.render(shot)};
@@ -107,11 +110,16 @@ class RenderedTour {
     return camera::Rig(std::move(cameras));
   }
 
-  ThreadPool pool_;
   camera::Rig rig_;
   std::vector<image::ImageBundle> frames_;
   std::vector<evaluation::Trajectory> rig_truth_;  // by camera
 };
+
+// The tour of the first cameras, rendered once in a process.
+inline const RenderedTour& rendered_tour(int cameras, std::size_t frames) {
+  static std::map<std::pair<int, std::size_t>, const RenderedTour> tours;
+  return tours.try_emplace({cameras, frames}, cameras, frames).first->second;
+}
 
 // Another place with similar texture: images mirrored horizontally.
 inline void mirror(image::CameraImage& image) {

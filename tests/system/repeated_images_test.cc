@@ -17,7 +17,7 @@ void repeat(const image::ImageBundle& from, image::ImageBundle& to) {
 }
 
 TEST(RepeatedImages, OfAMovingRigGiveNoPoseAndTrackingContinuesAfterThem) {
-  const RenderedTour tour(4, 40);
+  const RenderedTour& tour = rendered_tour(4, 40);
   std::vector<image::ImageBundle> frames = tour.frames();
   for (std::size_t k = kFirst; k < kEnd; ++k) repeat(frames[kFirst - 1], frames[k]);
   System system(tour.rig(), small_config(execution::Mode::kSequential));
@@ -49,7 +49,7 @@ TEST(RepeatedImages, OfASlowRigGiveNoPoseOnceItWouldHaveMovedVisibly) {
 
 // A video that was converted to twice its frame rate, after some frames from which the motion is known.
 TEST(RepeatedImages, EverySecondOneIsIgnored) {
-  const RenderedTour tour(2, 40);
+  const RenderedTour& tour = rendered_tour(2, 40);
   std::vector<image::ImageBundle> frames = tour.frames();
   for (std::size_t k = 5; k < frames.size(); k += 2) repeat(frames[k - 1], frames[k]);
   System system(tour.rig(), small_config(execution::Mode::kSequential));
@@ -60,7 +60,7 @@ TEST(RepeatedImages, EverySecondOneIsIgnored) {
 }
 
 TEST(RepeatedImages, OfARigAtRestHavePoses) {
-  const RenderedTour tour(2, 20);
+  const RenderedTour& tour = rendered_tour(2, 20);
   std::vector<image::ImageBundle> frames = tour.frames();
   for (std::size_t k = 1; k < 10; ++k) repeat(frames[0], frames[k]);  // before the motion is known
   System system(tour.rig(), small_config(execution::Mode::kSequential));

@@ -21,7 +21,7 @@ execution::Journal reread(const System& system) {
 }
 
 TEST(SystemReplay, RepeatsAParallelRunExactly) {
-  const RenderedTour tour(2, 14);
+  const RenderedTour& tour = rendered_tour(2, 14);
   for (int i = 0; i < 3; ++i) {
     Config config = small_config(execution::Mode::kParallel);
     config.tracking.keyframe.min_interval = 1;
@@ -38,7 +38,7 @@ TEST(SystemReplay, RepeatsAParallelRunExactly) {
 }
 
 TEST(SystemReplay, RepeatsARunThatDiscardedAMapParallel) {
-  const RenderedTour tour(1, 12);
+  const RenderedTour& tour = rendered_tour(1, 12);
   std::vector<image::ImageBundle> frames(tour.frames().begin(), tour.frames().begin() + 6);
   frames.push_back(tour.frames()[6]);
   mirror(frames.back().images[0]);
@@ -61,7 +61,7 @@ TEST(SystemReplay, RepeatsARunThatDiscardedAMapParallel) {
 }
 
 TEST(SystemReplay, RejectsAJournalOfOtherOptions) {
-  const RenderedTour tour(2, 10);
+  const RenderedTour& tour = rendered_tour(2, 10);
   System recorded(tour.rig(), small_config(execution::Mode::kSequential));
   for (const image::ImageBundle& images : tour.frames()) must_process(recorded, images);
   recorded.finish();
@@ -83,7 +83,7 @@ TEST(SystemReplay, RejectsAJournalOfOtherOptions) {
 }
 
 TEST(SystemReplay, RepeatsAnInterruptedRunParallel) {
-  const RenderedTour tour(2, 10);
+  const RenderedTour& tour = rendered_tour(2, 10);
   for (const execution::Mode mode :
        {execution::Mode::kSequential, execution::Mode::kParallel, execution::Mode::kLagged}) {
     System recorded(tour.rig(), small_config(mode));

@@ -27,7 +27,7 @@ Outcome run(const RenderedTour& tour, const Config& config) {
 }
 
 TEST(SystemSequential, IsDeterministicWithAnyNumberOfThreads) {
-  const RenderedTour tour(4, 16);
+  const RenderedTour& tour = rendered_tour(4, 16);
   const Outcome first = run(tour, small_config(execution::Mode::kSequential, 1));
   EXPECT_EQ(first.final.size(), tour.frames().size());
   for (const int threads : {1, 2, 4}) {
@@ -41,7 +41,7 @@ TEST(SystemSequential, IsDeterministicWithAnyNumberOfThreads) {
 
 TEST(SystemSequential, TracksWithOneToEightCameras) {
   const std::size_t count = 20;
-  const RenderedTour tour(8, count);
+  const RenderedTour& tour = rendered_tour(8, count);
   for (int n = 1; n <= 8; ++n) {
     System system(tour.rig_of(n), small_config(execution::Mode::kSequential));
     for (std::size_t k = 0; k < count; ++k) must_process(system, tour.frame_of(k, n));
@@ -56,14 +56,14 @@ TEST(SystemSequential, TracksWithOneToEightCameras) {
 }
 
 TEST(SystemSequential, EstimatesTheTruePathLengthWithTwoCameras) {
-  const RenderedTour tour(2, 24);
+  const RenderedTour& tour = rendered_tour(2, 24);
   const Outcome outcome = run(tour, small_config(execution::Mode::kSequential));
   const double truth_m = evaluation::path_length_m(tour.truth());
   EXPECT_NEAR(evaluation::path_length_m(outcome.final), truth_m, 0.03 * truth_m);
 }
 
 TEST(SystemSequential, ADamagedOrMissingImageAffectsOnlyItsCamera) {
-  const RenderedTour tour(4, 16);
+  const RenderedTour& tour = rendered_tour(4, 16);
   std::vector<image::ImageBundle> frames = tour.frames();
   make_absent(frames[6].images[1], ImageState::kDamaged);
   for (const std::size_t k : {8u, 9u}) make_absent(frames[k].images[0], ImageState::kMissing);
@@ -87,7 +87,7 @@ TEST(SystemSequential, ADamagedOrMissingImageAffectsOnlyItsCamera) {
 }
 
 TEST(SystemSequential, IsLostInTheDarkAndRecovers) {
-  const RenderedTour tour(2, 20);
+  const RenderedTour& tour = rendered_tour(2, 20);
   std::vector<image::ImageBundle> frames = tour.frames();
   for (const std::size_t k : {8u, 9u}) {
     for (image::CameraImage& i : frames[k].images) blacken(i);
@@ -111,7 +111,7 @@ TEST(SystemSequential, IsLostInTheDarkAndRecovers) {
 }
 
 TEST(SystemSequential, RecordsEveryInputFrame) {
-  const RenderedTour tour(2, 10);
+  const RenderedTour& tour = rendered_tour(2, 10);
   std::vector<image::ImageBundle> frames = tour.frames();
   for (const std::size_t k : {0u, 6u}) {
     for (image::CameraImage& i : frames[k].images) make_absent(i, ImageState::kMissing);
@@ -148,7 +148,7 @@ TEST(SystemSequential, RecordsEveryInputFrame) {
 }
 
 TEST(SystemSequential, UsesOnlyUnmaskedPixels) {
-  const RenderedTour tour(2, 4);
+  const RenderedTour& tour = rendered_tour(2, 4);
   image::Image nothing(tour.rig().camera(1).width, tour.rig().camera(1).height);
   image::CameraImage black{ImageState::kPresent, 0, nothing};
   blacken(black);
@@ -210,7 +210,7 @@ TEST_F(SystemContradictedMap, IsKeptAfterSeveralOthers) {
 
 // All images are at rest but for two opposite quarters, which are displaced in every third frame.
 TEST(SystemSequential, DiscardsANewMapOfTwoMotions) {
-  const RenderedTour tour(2, 16);
+  const RenderedTour& tour = rendered_tour(2, 16);
   Config config = small_config(execution::Mode::kSequential);
   config.tracking.keyframe.min_interval = 18;               // so that the map contains one of the motions only
   config.calibration.refine = calibration::Refine::kFalse;  // one keyframe is too few to compare the calibration
@@ -239,7 +239,7 @@ TEST(SystemSequential, DiscardsANewMapOfTwoMotions) {
 }
 
 TEST(SystemSequential, DiscardsANewMapUpToScaleAndItsPosesIfLost) {
-  const RenderedTour tour(1, 16);
+  const RenderedTour& tour = rendered_tour(1, 16);
   System system(tour.rig(), small_config(execution::Mode::kSequential));
   std::size_t k = 0;
   while (k < 8 && tracked_frames(system) == 0) must_process(system, tour.frames()[k++]);
@@ -268,7 +268,7 @@ TEST(SystemSequential, DiscardsANewMapUpToScaleAndItsPosesIfLost) {
 
 // A rig that stands still adds no keyframes, so that its map stays small.
 TEST(SystemSequential, KeepsASmallMapUpToScaleThatAgreedForSeconds) {
-  const RenderedTour tour(1, 16);
+  const RenderedTour& tour = rendered_tour(1, 16);
   System system(tour.rig(), small_config(execution::Mode::kSequential));
   std::size_t k = 0;
   while (k < 8 && tracked_frames(system) == 0) must_process(system, tour.frames()[k++]);
@@ -288,7 +288,7 @@ TEST(SystemSequential, KeepsASmallMapUpToScaleThatAgreedForSeconds) {
 }
 
 TEST(SystemSequential, KeepsANewMapDuringADarkFrame) {
-  const RenderedTour tour(1, 16);
+  const RenderedTour& tour = rendered_tour(1, 16);
   System system(tour.rig(), small_config(execution::Mode::kSequential));
   std::size_t k = 0;
   while (k < 8 && tracked_frames(system) == 0) must_process(system, tour.frames()[k++]);
@@ -304,7 +304,7 @@ TEST(SystemSequential, KeepsANewMapDuringADarkFrame) {
 }
 
 TEST(SystemSequential, InitialisesUpToScaleSoonAfterADarkFirstFrame) {
-  const RenderedTour tour(1, 16);
+  const RenderedTour& tour = rendered_tour(1, 16);
   System system(tour.rig(), small_config(execution::Mode::kSequential));
   image::ImageBundle dark = tour.frames()[0];
   blacken(dark.images[0]);
@@ -315,7 +315,7 @@ TEST(SystemSequential, InitialisesUpToScaleSoonAfterADarkFirstFrame) {
 
 // The first one is made from an earlier frame than the one that initialises the map.
 TEST(SystemSequential, KeyframesOfAMonocularInitialisationHaveTheTimesOfTheirFrames) {
-  const RenderedTour tour(1, 8);
+  const RenderedTour& tour = rendered_tour(1, 8);
   System system(tour.rig(), small_config(execution::Mode::kSequential));
   for (std::size_t k = 0; k < 8 && tracked_frames(system) == 0; ++k) must_process(system, tour.frames()[k]);
   const map::MapSnapshot map = system.snapshot();
@@ -326,7 +326,7 @@ TEST(SystemSequential, KeyframesOfAMonocularInitialisationHaveTheTimesOfTheirFra
 }
 
 TEST(SystemSequential, RejectsAnInvalidFrameAndContinues) {
-  const RenderedTour tour(2, 6);
+  const RenderedTour& tour = rendered_tour(2, 6);
   System system(tour.rig(), small_config(execution::Mode::kSequential)),
       undisturbed(tour.rig(), small_config(execution::Mode::kSequential));
   for (const image::ImageBundle& images : tour.frames()) {
@@ -343,7 +343,7 @@ TEST(SystemSequential, RejectsAnInvalidFrameAndContinues) {
 
 TEST(SystemSequential, KeepsTheConfiguredHistory) {
   constexpr std::size_t kHistory = 4;
-  const RenderedTour tour(2, 16);
+  const RenderedTour& tour = rendered_tour(2, 16);
   System all(tour.rig(), small_config(execution::Mode::kSequential)),
       bounded(tour.rig(), small_config(execution::Mode::kSequential), {.history = kHistory});
   for (const image::ImageBundle& images : tour.frames()) {
@@ -362,7 +362,7 @@ TEST(SystemSequential, KeepsTheConfiguredHistory) {
 }
 
 TEST(SystemSequential, FinalAdjustmentDecreasesTheCost) {
-  const RenderedTour tour(2, 8);
+  const RenderedTour& tour = rendered_tour(2, 8);
   Config config = small_config(execution::Mode::kSequential);
   config.mapping.global.final_iterations = 0;  // the round on the inliers minimises another cost
   System system(tour.rig(), config);
@@ -376,7 +376,7 @@ TEST(SystemSequential, FinalAdjustmentDecreasesTheCost) {
 }
 
 TEST(SystemSequential, AdjustsTheWholeMapAtTheEndOnlyIfConfigured) {
-  const RenderedTour tour(2, 8);
+  const RenderedTour& tour = rendered_tour(2, 8);
   for (const bool wanted : {false, true}) {
     Config config = small_config(execution::Mode::kSequential);
     config.final_adjustment = wanted;
