@@ -85,13 +85,14 @@ std::size_t camera_of_estimate(const Arguments& a, const std::string& name, cons
 }
 
 // T_cam_truth of the frame of the ground truth and of the camera of the estimate; nullopt if both paths are in one
-// frame.
+// frame, as an estimate of the body and EuRoC's own ground truth are.
 std::optional<geometry::SE3> frame_of_truth(const Arguments& a, const std::string& name,
-                                            const evaluation::TrajectoryComments& estimate) {
-  const bool body = a.gt_frame == "body";
+                                            const evaluation::TrajectoryComments& estimate,
+                                            const evaluation::TrajectoryComments& truth) {
+  const bool body = a.gt_frame == "body", euroc_truth = truth.euroc_csv && truth.frame_of_poses() == "body";
   if (a.camera && !a.rig) raise({"evaluate", "camera", "no rig", "rig=FILE, which has the camera"});
   const std::string frame = a.camera ? estimate.frame : estimate.frame_of_poses();
-  if (body && frame == "body") return std::nullopt;
+  if (frame == "body" && (body || euroc_truth)) return std::nullopt;
   if (!a.rig) {
     if (body) raise({"evaluate", "gt_frame=body", "no rig", "rig=FILE with the pose of the camera on the body"});
     return std::nullopt;
@@ -167,6 +168,11 @@ std::vector<Path> files_of(const Given& est, const Given& gt, const Arguments& a
   return files;
 }
 
+evaluation::TrajectoryComments comments_of(const Given& given) {
+  const Path* file = std::get_if<Path>(&given);
+  return file != nullptr ? evaluation::read_comments(*file) : evaluation::TrajectoryComments{};
+}
+
 nb::dict evaluate(const Given& est, const Given& gt, const Arguments& a) {
   const evaluation::EvaluationOptions options = options_of(a);
   if (a.plot) check(report::check_plot_file(*a.plot, "evaluate", "plot", files_of(est, gt, a)));
@@ -174,8 +180,8 @@ nb::dict evaluate(const Given& est, const Given& gt, const Arguments& a) {
   auto truth = read(gt, "gt", a.times);
   const Path* file = std::get_if<Path>(&est);
   const std::string name = file != nullptr ? file->string() : "est";
-  const auto comments = file != nullptr ? evaluation::read_comments(*file) : evaluation::TrajectoryComments{};
-  if (const auto T_cam_truth = frame_of_truth(a, name, comments)) {
+  const auto comments = comments_of(est);
+  if (const auto T_cam_truth = frame_of_truth(a, name, comments, comments_of(gt))) {
     evaluation::move_to_one_frame(*T_cam_truth, comments.scale == "metric", estimate, truth);
   }
   auto result = evaluation::evaluate(estimate, truth, options);

@@ -80,6 +80,14 @@ def test_poses_of_the_body_in_both_files_are_not_moved(recording, program, tmp_p
     assert found.ate.rmse == theirs["ate"]["rmse"] and found.ate.max < 1e-6
 
 
+def test_the_body_is_compared_with_the_ground_truth_of_euroc_as_it_is(recording, program):
+    truth = recording.folder / "mav0/state_groundtruth_estimate0/data.csv"
+    rig = recording.folder / "rig.yaml"
+    found = bslam.evaluate(truth, truth, rig=rig)
+    theirs = json.loads(program("eval", truth, truth, "--rig", rig, "--json"))
+    assert found.ate.rmse == theirs["ate"]["rmse"] and found.ate.max < 1e-6
+
+
 def test_camera_is_the_one_that_the_trajectory_names(recording, program, tmp_path):
     out = tmp_path / "run"
     program("run", recording.folder, "--mode=sequential", "--cameras=1,0", "--out", out)

@@ -60,9 +60,12 @@ CalibrationReport report_calibration(const system::System& system, const camera:
   if (estimate.verdict != calibration::Verdict::kInconsistent) return report;
   const std::string text = calibration::contradiction_text(estimate);
   if (!system.calibration_refined()) report.doubt = text;
-  report.warnings.push_back(text + (system.calibration_refined()
-                                        ? "; the map uses an estimate of it, MapView::rig()"
-                                        : "; the estimate is not used, but is with calibration.refine=auto"));
+  report.warnings.push_back(
+      text + (system.calibration_refined() ? "; the map uses an estimate of it, MapView::rig()"
+              : estimate.implausible
+                  ? "; the estimate is not used: the images of some cameras disagree as a whole, so that their time "
+                    "stamps or extrinsics may be far off"
+                  : "; the estimate is not used, but is with calibration.refine=auto"));
   return report;
 }
 

@@ -3,6 +3,7 @@
 #include <bslam/system.h>
 
 #include <atomic>
+#include <mutex>
 #include <optional>
 #include <utility>
 
@@ -98,7 +99,8 @@ struct System::Impl {
 
   const camera::Rig rig;
   const std::uint64_t vocabulary;
-  std::string map_warning;  // reason why the poses of the map cannot be relied on; may be empty
+  mutable std::mutex at_end;  // guards the next two, which finish() changes
+  std::string map_warning;    // reason why the poses of the map cannot be relied on; may be empty
   system::System system;
   api::BundleReader reader;
   api::Notifier notifier;
@@ -141,7 +143,9 @@ Status System::Impl::finish() {
   finished = true;
   const Status done = api::guarded("System::finish", [&]() -> Status {
     system.finish();
-    calibration = api::report_calibration(system, rig);
+    api::CalibrationReport report = api::report_calibration(system, rig);
+    const std::lock_guard lock(at_end);
+    calibration = std::move(report);
     if (map_warning.empty()) map_warning = calibration.doubt;
     return {};
   });
@@ -196,7 +200,9 @@ Status System::finish() {
 }
 
 CalibrationVerdict System::calibration_verdict() const {
-  return impl_ ? impl_->calibration.verdict : CalibrationVerdict::kUnknown;
+  if (!impl_) return CalibrationVerdict::kUnknown;
+  const std::lock_guard lock(impl_->at_end);
+  return impl_->calibration.verdict;
 }
 
 void System::interrupt() {
@@ -209,8 +215,10 @@ Status System::save_map(const std::filesystem::path& file) const {
   if (!impl_) return moved_from("System::save_map");
   return api::guarded("System::save_map", [&]() -> Status {
     if (const Status s = check_output_file(file.string(), "", true, storage::kMapFileBegin); !s) return s;
-    return storage::write_map(*impl_->system.snapshot(), {impl_->vocabulary, BSLAM_VERSION, "live", impl_->map_warning},
-                              file);
+    std::unique_lock lock(impl_->at_end);
+    const storage::MapFileInfo info{impl_->vocabulary, BSLAM_VERSION, "live", impl_->map_warning};
+    lock.unlock();
+    return storage::write_map(*impl_->system.snapshot(), info, file);
   });
 }
 

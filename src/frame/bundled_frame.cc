@@ -16,10 +16,11 @@ double BundledFrame::delay_s(std::size_t c) const {
   return camera.state == image::ImageState::kPresent ? to_seconds(camera.time_ns - time_ns) : 0.0;
 }
 
-void CameraFrame::correct_time(double shift_s) {
-  const TimeNs shift_ns = from_seconds(shift_s);
-  time_ns += shift_ns;
-  correction_ns += shift_ns;
+void CameraFrame::correct_time(double shift_s) { set_correction(correction_ns + from_seconds(shift_s)); }
+
+void CameraFrame::set_correction(TimeNs correction) {
+  time_ns += correction - correction_ns;
+  correction_ns = correction;
 }
 
 BundledFrame without_images(const BundledFrame& frame) {

@@ -27,8 +27,9 @@ struct CameraFrame {
   FeatureGrid grid;              // grid of the keypoints' pixels
   SharedArray<WordId> words;     // per keypoint, word of the vocabulary; empty until computed
 
-  // The image was captured so much later.
+  // The image was captured so much later than its present capture time, or than its stamp says.
   void correct_time(double shift_s);
+  void set_correction(TimeNs correction);
 };
 
 // What the matched features of a frame say about the size of a map whose scale is not known.

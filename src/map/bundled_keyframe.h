@@ -18,11 +18,11 @@ struct Covisible {
   int weight = 0;
 };
 
-// A change of the capture time of one image of a keyframe.
+// The correction of the capture time of one image of a keyframe (frame::CameraFrame).
 struct CaptureTime {
   KeyframeId keyframe;
   CameraIndex camera;
-  double shift_s = 0;
+  TimeNs correction_ns = 0;
 };
 
 // `landmarks` and `covisible` are shared between versions separately from the other members, so that a change of the

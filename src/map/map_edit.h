@@ -24,7 +24,8 @@
 // |                     | uncertainties                                                                            |
 // | SetTwists           | entries of removed keyframes are dropped; translational velocities are multiplied by the |
 // |                     | change of scale at the keyframe since the base                                           |
-// | CorrectTimes        | entries of removed keyframes are dropped                                                 |
+// | CorrectTimes        | dropped if a correction was committed since the base; entries of removed keyframes are   |
+// |                     | dropped; the last one committed wins                                                     |
 // | ScaleSubmap         | also scales newer keyframes and landmarks; dropped if the submap was removed or merged   |
 // | MergeSubmaps        | a removed keyframe is replaced by its nearest alive ancestor; dropped if both are in the |
 // |                     | same submap                                                                              |

@@ -233,6 +233,7 @@ bool Rebase::operator()(const SetTwists& op) {
 }
 
 bool Rebase::operator()(const CorrectTimes& op) {
+  if (!same_epoch_) return false;  // like the poses with which the times were estimated
   bool any = false;
   for (CaptureTime change : op.changes) {
     change.keyframe = map_id(change.keyframe);

@@ -22,15 +22,53 @@ constexpr double kExact_s2 = 0.25 * kMillisecond_s2;
 
 bool wrong(const StampErrors& stamps) { return stamps.variance_s2 > kExact_s2; }
 
-// Of the errors that remain after the corrections of the frame. Those of the reference camera and of cameras with exact
-// stamps are zero.
-ShiftPrior prior_of(const frame::BundledFrame& frame, std::size_t reference, std::span<const StampErrors> stamps) {
-  ShiftPrior out(frame.cameras.size());
-  for (std::size_t c = 0; c < frame.cameras.size(); ++c) {
-    if (c != reference && wrong(stamps[c]))
-      out.set(c, stamps[c].variance_s2, to_seconds(frame.cameras[c].correction_ns));
+// The mean of the errors of a camera after a change of its time offset.
+double mean_s(const StampErrors& stamps, TimeNs time_offset_ns) {
+  return stamps.mean_s - to_seconds(time_offset_ns - stamps.time_offset_ns);
+}
+
+// Per camera, whether the capture time of its image is corrected: its stamps are wrong, and their mean error relative
+// to the reference camera is known.
+std::vector<std::uint8_t> correctable(const frame::BundledFrame& frame, std::span<const StampErrors> stamps) {
+  constexpr int kKnown = 5;  // errors in the mean
+  std::vector<std::uint8_t> out(frame.cameras.size(), 0);
+  const std::size_t reference = frame::reference_camera(frame);
+  for (std::size_t c = 0; c < out.size(); ++c) {
+    out[c] = c != reference && frame.cameras[c].state == image::ImageState::kPresent && wrong(stamps[c]) &&
+             stamps[c].reference == reference && stamps[c].count >= kKnown;
   }
   return out;
+}
+
+// Of the errors that remain after the corrections of the frame. Those of other cameras are zero.
+ShiftPrior prior_of(const TrackInput& input, const frame::BundledFrame& frame,
+                    std::span<const std::uint8_t> corrected) {
+  ShiftPrior out(frame.cameras.size());
+  for (std::size_t c = 0; c < frame.cameras.size(); ++c) {
+    if (!corrected[c]) continue;
+    const double mean = mean_s(input.state.stamps[c], input.map.rig().camera(c).time_offset_ns);
+    out.set(c, input.state.stamps[c].variance_s2, to_seconds(frame.cameras[c].correction_ns) - mean);
+  }
+  return out;
+}
+
+// Estimates pose and capture times. Returns false if they are not finite.
+bool estimate_capture_times(const TrackInput& input, std::span<const solver::PoseObservation> observations, SE3 T,
+                            std::span<const std::uint8_t> corrected, frame::BundledFrame& frame) {
+  constexpr int kSteps = 6;
+  constexpr double kConverged_s = 1e-5;
+  for (int step = 0; step < kSteps; ++step) {
+    const Vector6d twist = motion_model(input, frame).twist(T);
+    const auto found = solver::time_shift_step(frame::rig_of(input.map.rig(), frame, twist), observations, T, twist,
+                                               prior_of(input, frame, corrected));
+    if (!found.all_finite()) return false;
+    T = T.perturbed(found.pose);
+    for (std::size_t c = 0; c < frame.cameras.size(); ++c) {
+      if (corrected[c]) frame.cameras[c].correct_time(found.shift_s(static_cast<Eigen::Index>(c)));
+    }
+    if (found.shift_s.cwiseAbs().maxCoeff() < kConverged_s) break;
+  }
+  return true;
 }
 
 // The variance of the errors by three successive ones, the middle one of which is compared with the line through the
@@ -44,6 +82,21 @@ std::optional<double> variance_by(const StampError& first, const StampError& mid
   return (difference_s * difference_s - of_estimates_s2) / (1 + a * a + b * b);
 }
 
+// The errors after a change of the time offset of the camera, or of the camera that they are relative to.
+void follow(std::size_t reference, TimeNs time_offset_ns, StampErrors& stamps) {
+  const double change_s = to_seconds(time_offset_ns - stamps.time_offset_ns);
+  stamps.mean_s -= change_s;
+  for (auto* error : {&stamps.last, &stamps.before_last}) {
+    if (*error) (*error)->error_s -= change_s;
+  }
+  stamps.time_offset_ns = time_offset_ns;
+  if (reference == stamps.reference) return;
+  stamps.reference = reference;
+  stamps.mean_s = 0;
+  stamps.count = 0;
+  stamps.last = stamps.before_last = std::nullopt;
+}
+
 // Updates the errors of a camera with that of one image. A single one that is large, which is part of three
 // differences, may be another error, and leaves the stamps exact.
 void update(const StampError& found, StampErrors& stamps) {
@@ -53,36 +106,36 @@ void update(const StampError& found, StampErrors& stamps) {
     const double most = std::max(kMost_s2, kJump * stamps.variance_s2);
     stamps.variance_s2 = std::max(0.0, (1 - kRate) * stamps.variance_s2 + kRate * std::min(*measured, most));
   }
-  stamps.mean_s += kRateOfMean * (found.error_s - stamps.mean_s);
+  ++stamps.count;
+  stamps.mean_s += std::max(kRateOfMean, 1.0 / stamps.count) * (found.error_s - stamps.mean_s);
   stamps.before_last = std::exchange(stamps.last, found);
 }
 
 }  // namespace
 
-void correct_capture_times(const TrackInput& input, std::span<const solver::PoseObservation> observations,
-                           const SE3& T_rig_world, frame::BundledFrame& frame) {
-  constexpr int kSteps = 6;
-  constexpr double kConverged_s = 1e-5;
+std::vector<TimeNs> correct_capture_times(const TrackInput& input,
+                                          std::span<const solver::PoseObservation> observations, const SE3& T_rig_world,
+                                          frame::BundledFrame& frame) {
   const std::span<const StampErrors> stamps = input.state.stamps;
-  if (std::ranges::none_of(stamps, wrong)) return;
-  const std::size_t reference = frame::reference_camera(frame);
-  SE3 T = T_rig_world;
-  for (int step = 0; step < kSteps; ++step) {
-    const Vector6d twist = motion_model(input, frame).twist(T);
-    const auto found = solver::time_shift_step(frame::rig_of(input.map.rig(), frame, twist), observations, T, twist,
-                                               prior_of(frame, reference, stamps));
-    if (!found.all_finite()) return;
-    T = T.perturbed(found.pose);
-    for (std::size_t c = 0; c < frame.cameras.size(); ++c) {
-      if (c == reference || !wrong(stamps[c])) continue;
-      frame.cameras[c].correct_time(found.shift_s(static_cast<Eigen::Index>(c)));
-      frame.cameras[c].stamp_variance_s2 = stamps[c].variance_s2;
-    }
-    if (found.shift_s.cwiseAbs().maxCoeff() < kConverged_s) break;
+  if (std::ranges::none_of(stamps, wrong) || motion_model(input, frame).twist(T_rig_world).isZero(0)) return {};
+  const std::vector<std::uint8_t> corrected = correctable(frame, stamps);
+  if (std::ranges::find(corrected, 1) == corrected.end()) return {};
+  std::vector<TimeNs> before;
+  for (const frame::CameraFrame& camera : frame.cameras) before.push_back(camera.correction_ns);
+  if (!estimate_capture_times(input, observations, T_rig_world, corrected, frame)) {
+    restore_capture_times(before, frame);
+    return {};
   }
   for (std::size_t c = 0; c < frame.cameras.size(); ++c) {
-    if (c != reference && wrong(stamps[c])) frame.cameras[c].correct_time(-stamps[c].mean_s);
+    if (!corrected[c]) continue;
+    frame.cameras[c].correct_time(-mean_s(stamps[c], input.map.rig().camera(c).time_offset_ns));
+    frame.cameras[c].stamp_variance_s2 = stamps[c].variance_s2;
   }
+  return before;
+}
+
+void restore_capture_times(std::span<const TimeNs> corrections, frame::BundledFrame& frame) {
+  for (std::size_t c = 0; c < corrections.size(); ++c) frame.cameras[c].set_correction(corrections[c]);
 }
 
 void update_stamp_errors(const map::BundledMap& map, const frame::BundledFrame& frame, const SE3& T_rig_world,
@@ -101,6 +154,7 @@ void update_stamp_errors(const map::BundledMap& map, const frame::BundledFrame& 
     const auto i = static_cast<Eigen::Index>(c);
     if (c == reference || !(found.variance_s2(i) < kMillisecond_s2)) continue;
     const double error_s = to_seconds(frame.cameras[c].correction_ns) + found.shift_s(i);
+    follow(reference, map.rig().camera(c).time_offset_ns, stamps[c]);
     update({error_s, found.variance_s2(i), frame.time_ns}, stamps[c]);
   }
 }

@@ -15,11 +15,14 @@
 namespace bslam::tracking {
 
 // Corrects the capture times of cameras whose stamps are known to be wrong. The errors are estimated together with the
-// pose; their prior is normal with the variance of input.state.stamps. Their mean is left: without a common view it
-// would wander with the landmarks of the camera. Other frames stay as they are. `observations`: camera by camera.
-// `T_rig_world`: an approximate pose.
-void correct_capture_times(const TrackInput& input, std::span<const solver::PoseObservation> observations,
-                           const geometry::SE3& T_rig_world, frame::BundledFrame& frame);
+// pose; their prior is normal with the mean and the variance of input.state.stamps. Their mean is left: without a
+// common view it would wander with the landmarks of the camera. Other frames stay as they are. `observations`: camera
+// by camera. `T_rig_world`: an approximate pose. Returns the former corrections per camera; empty if nothing was
+// changed.
+std::vector<TimeNs> correct_capture_times(const TrackInput& input,
+                                          std::span<const solver::PoseObservation> observations,
+                                          const geometry::SE3& T_rig_world, frame::BundledFrame& frame);
+void restore_capture_times(std::span<const TimeNs> corrections, frame::BundledFrame& frame);
 
 // Updates the errors with a frame that was tracked at `T_rig_world` and its inliers.
 void update_stamp_errors(const map::BundledMap& map, const frame::BundledFrame& frame, const geometry::SE3& T_rig_world,

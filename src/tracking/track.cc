@@ -1,8 +1,6 @@
 #include "tracking/track.h"
 
 #include <algorithm>
-#include <cmath>
-#include <numeric>
 
 #include "frame/rig_at.h"
 #include "tracking/keyframe_decision.h"
@@ -100,15 +98,17 @@ bool track_in_narrow_windows(const TrackInput& input, const std::vector<Landmark
   drop(excluded, found);
   if (count(found) < static_cast<std::size_t>(options.min_inliers)) return false;
   const auto observations = pose_observations(map, frame, found, input.features);
-  correct_capture_times(input, observations, predicted, out.frame);
+  const std::vector<TimeNs> times = correct_capture_times(input, observations, predicted, out.frame);
   const solver::MotionModel motion = motion_model(input, frame);
   auto [solution, matches, contest] = robust_pose(input, frame, found, observations, predicted, motion, options.pose);
   const std::vector<std::uint8_t> contradicting =
       exclude_contradicting(input, frame, options, found, excluded, solution);
   const bool few = !supported(solution, std::min(matches, count(found)), options.min_inliers, options);
   if (few && !(out.unconfirmed && solution.ok && solution.num_inliers >= options.min_inliers_wide &&
-               confirmed_by_matches(input, frame, found, options.matching.predicted_radius, solution.T_rig_world)))
+               confirmed_by_matches(input, frame, found, options.matching.predicted_radius, solution.T_rig_world))) {
+    restore_capture_times(times, out.frame);
     return false;
+  }
   out.unconfirmed = few;
   out.contest.add(contest);
   out.frame.twist = motion.twist(solution.T_rig_world);

@@ -95,7 +95,10 @@ struct StampError {
 // What the frames so far show of the errors of a camera's time stamps (tracking/stamp_errors.h).
 struct StampErrors {
   double variance_s2 = 0;
-  double mean_s = 0;  // not corrected: it is a time offset, that is part of the calibration
+  double mean_s = 0;          // not corrected: it is a time offset, that is part of the calibration
+  int count = 0;              // number of errors in the mean
+  std::size_t reference = 0;  // camera relative to which the errors are
+  TimeNs time_offset_ns = 0;  // of the camera by the calibration with which the errors were found
   std::optional<StampError> last, before_last;
 };
 

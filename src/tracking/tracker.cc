@@ -368,8 +368,10 @@ bool Tracker::relocalise(Input& input, TrackOutcome& outcome) {
   std::sort(landmarks.begin(), landmarks.end());
   TrackerState& state = outcome.next.track;
   auto cameras = readmit_observing_cameras(state.cameras, seen, options_.tracking.consensus);
-  state = state_at_keyframe({}, input.frame.time_ns, *input.map, place->matched_keyframe, std::move(landmarks));
-  state.cameras = std::move(cameras);
+  TrackerState fresh;
+  fresh.cameras = std::move(cameras);
+  fresh.stamps = std::move(state.stamps);
+  state = state_at_keyframe(fresh, input.frame.time_ns, *input.map, place->matched_keyframe, std::move(landmarks));
   state.anchored = map::AnchoredPose::at(*input.map, place->matched_keyframe, place->T_rig_world);
   outcome.next.forget_pending();
   outcome.record.relocalisation = Relocalisation{place->matched_keyframe, place->inliers};

@@ -206,10 +206,12 @@ void Tracker::complete_start(const map::CommitReport& report, TrackOutcome& outc
   TrackResult& result = outcome.record.result;
   const KeyframeId last = report.keyframes.back();
   const map::BundledKeyframe& keyframe = report.published->keyframe(last);
-  state.track = state_at_keyframe({}, result.time_ns, *report.published, last,
+  TrackerState fresh;
+  fresh.cameras = readmit_observing_cameras(std::vector<CameraConsensusState>(rig_.size()),
+                                            map::landmarks_by_camera(keyframe), options_.tracking.consensus);
+  fresh.stamps = std::move(state.track.stamps);
+  state.track = state_at_keyframe(fresh, result.time_ns, *report.published, last,
                                   committed_landmarks(outcome.edit->landmarks, outcome.edit->base_landmarks, report));
-  state.track.cameras = readmit_observing_cameras(std::vector<CameraConsensusState>(rig_.size()),
-                                                  map::landmarks_by_camera(keyframe), options_.tracking.consensus);
   if (report.keyframes.size() == 2 && !keyframe.twist.isZero()) {
     state.track.twist = keyframe.twist;
     state.track.twist_interval_s = to_seconds(result.time_ns - state.waiting.back()->time_ns);

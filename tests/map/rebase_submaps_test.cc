@@ -162,20 +162,31 @@ TEST_F(RebaseTest, MotionScalesWithTheSubmapAndIsDroppedWithItsKeyframe) {
   EXPECT_FALSE(report.published->alive(kThird));
 }
 
-TEST_F(RebaseTest, CaptureTimesAddUpAndAreDroppedWithTheirKeyframe) {
-  early->correct_times({{kSecond, CameraIndex(0), 0.002}});
+// Two adjustments from one version of the map find the same errors of the stamps.
+TEST_F(RebaseTest, TheLastCaptureTimesAreKeptAndThoseOfARemovedKeyframeDropped) {
+  early->correct_times({{kSecond, CameraIndex(0), 2'000'000}});
   early->remove_keyframe(kThird);
   const KeyframeId newer = add_keyframe(*late, same_numbers(0, 5));
   const TimeNs before = late->map().keyframe(kSecond).frame->cameras[0].time_ns;
   late->correct_times(
-      {{kSecond, CameraIndex(0), 0.001}, {kThird, CameraIndex(0), 0.001}, {newer, CameraIndex(0), -0.001}});
-  EXPECT_EQ(late->map().keyframe(kSecond).frame->cameras[0].time_ns, before + 1'000'000);
+      {{kSecond, CameraIndex(0), 3'000'000}, {kThird, CameraIndex(0), 1'000'000}, {newer, CameraIndex(0), -1'000'000}});
+  EXPECT_EQ(late->map().keyframe(kSecond).frame->cameras[0].time_ns, before + 3'000'000);
   const CommitReport report = commit();
   const frame::CameraFrame& camera = report.published->keyframe(kSecond).frame->cameras[0];
   EXPECT_EQ(camera.time_ns, before + 3'000'000);
   EXPECT_EQ(camera.correction_ns, 3'000'000);
   EXPECT_EQ(report.published->keyframe(report.keyframes.at(0)).frame->cameras[0].correction_ns, -1'000'000);
   EXPECT_FALSE(report.published->alive(kThird));
+}
+
+// They were estimated together with poses, which are dropped as well.
+TEST_F(RebaseTest, CaptureTimesAreDroppedAfterACorrectionOfTheMap) {
+  SetPoses correction;
+  correction.keyframes.emplace_back(kSecond, early->map().keyframe(kSecond).T_rig_world);
+  correction.correction = true;
+  early->set_poses(std::move(correction));
+  late->correct_times({{kSecond, CameraIndex(0), 3'000'000}});
+  EXPECT_EQ(commit().published->keyframe(kSecond).frame->cameras[0].correction_ns, 0);
 }
 
 // The rig with longer focal lengths.

@@ -445,7 +445,7 @@ TEST_F(MapExportFiles, NamesFromFilesCannotLeadOutOfTheFolderOrBreakLines) {
 
 // A run corrects the capture times of images whose stamps are wrong.
 TEST_F(MapExportFiles, ImagesWithCorrectedCaptureTimesAreFound) {
-  for (const KeyframeId k : selection_.keyframes) map_.correct_time({k, CameraIndex(1), 0.004});
+  for (const KeyframeId k : selection_.keyframes) map_.correct_time({k, CameraIndex(1), 4'000'000});
   const ImageTable images(selection_, &data_, root());
   EXPECT_EQ(images.found(), images.images().size());
   for (dataset::FrameEntry& frame : data_.frames) frame.images[1]->time_ns += 30'000'000;

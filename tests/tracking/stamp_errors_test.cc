@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <span>
+#include <vector>
 
 #include "tracking/simulated_tracker.h"
 
@@ -69,6 +72,82 @@ TEST(StampErrors, ExactStampsStayAsTheyAre) {
 // A time offset belongs to the calibration, which estimates it.
 TEST(StampErrors, AConstantErrorIsNotCorrected) {
   EXPECT_NEAR(track_with_wrong_stamps(0, 0.004, true).time_error_s, 0.004, 1e-9);
+}
+
+// The part of the errors that differs from image to image is corrected, whatever the constant one is. A blind camera
+// shows nothing of the error of its stamp, which is then expected to be the constant one.
+TEST(StampErrors, AConstantErrorRemainsWhereTheOthersAreCorrected) {
+  constexpr double kDeviation_s = 0.003, kConstant_s = 0.006;
+  const auto sim = simulator(synthetic::default_rig());
+  const map::SimulatedMap world = true_map(sim, 2.5, 0.25);
+  SimulatedTracker tracker(world);
+  Random random(4, "stamps");
+  std::vector<double> remaining_s;
+  double given_s = 0;
+  for (int i = 1; i <= kFrames; ++i) {
+    auto seen = sim.frame(FrameId(i), kFirst_s * i);
+    const double error_s = kConstant_s + kDeviation_s * random.normal();
+    seen.frame.cameras[1].time_ns += from_seconds(error_s);
+    given_s += error_s;
+    const bool blind = i == kFrames;
+    if (blind) seen.frame.cameras[1].keypoints = {};
+    const TrackOutput tracked = tracker.track(seen.frame);
+    const double corrected_s = to_seconds(tracked.frame.cameras[1].correction_ns);
+    if (blind) {
+      EXPECT_NEAR(corrected_s, 0, 1e-5);
+    } else if (2 * i > kFrames) {
+      remaining_s.push_back(error_s + corrected_s);
+    }
+  }
+  const Eigen::Map<const Eigen::ArrayXd> errors(remaining_s.data(), std::ssize(remaining_s));
+  EXPECT_NEAR(errors.mean(), given_s / kFrames, 0.0015);
+  EXPECT_LT(std::sqrt((errors - errors.mean()).square().mean()), 0.4 * kDeviation_s);
+}
+
+// The errors are relative to the camera that determines the time of the frame: every other frame camera 1, whose stamps
+// have a constant error.
+TEST(StampErrors, AnotherReferenceCameraIsNoEvidence) {
+  constexpr std::array kFirst = {0};
+  const auto sim = simulator(synthetic::default_rig());
+  const map::SimulatedMap world = true_map(sim, 2.5, 0.25);
+  SimulatedTracker tracker(world);
+  for (int i = 1; i <= kFrames; ++i) {
+    const bool without_first = i % 2 == 1;
+    auto seen =
+        sim.frame(FrameId(i), kFirst_s * i, without_first ? std::span<const int>(kFirst) : std::span<const int>());
+    if (without_first) {
+      for (std::size_t c = 2; c < seen.frame.cameras.size(); ++c) seen.frame.cameras[c].time_ns += 4'000'000;
+    } else {
+      seen.frame.cameras[1].time_ns -= 4'000'000;
+    }
+    const TrackOutput tracked = tracker.track(seen.frame);
+    for (const frame::CameraFrame& camera : tracked.frame.cameras) EXPECT_EQ(camera.correction_ns, 0) << i;
+  }
+}
+
+TEST(StampErrors, AnEstimateOfTheTimeOffsetTakesTheConstantErrorAway) {
+  constexpr double kDeviation_s = 0.003, kConstant_s = 0.006;
+  const auto sim = simulator(synthetic::default_rig());
+  map::SimulatedMap world = true_map(sim, 2.5, 0.25);
+  SimulatedTracker tracker(world);
+  Random random(4, "stamps");
+  double sum_s = 0;
+  for (int i = 1; i <= kFrames; ++i) {
+    auto seen = sim.frame(FrameId(i), kFirst_s * i);
+    const bool estimated = 2 * i > kFrames;
+    const double error_s = (estimated ? 0 : kConstant_s) + kDeviation_s * random.normal();
+    seen.frame.cameras[1].time_ns += from_seconds(error_s);
+    if (2 * i == kFrames + 2) {
+      std::vector<camera::RigCamera> cameras;
+      for (std::size_t c = 0; c < sim.rig().size(); ++c)
+        cameras.push_back({sim.rig().camera(c), sim.rig().body_from_cam(c)});
+      cameras[1].camera.time_offset_ns -= from_seconds(kConstant_s);
+      world.map.set_rig(std::make_shared<const camera::Rig>(std::move(cameras)));
+    }
+    const TrackOutput tracked = tracker.track(seen.frame);
+    if (estimated) sum_s += error_s + to_seconds(tracked.frame.cameras[1].correction_ns);
+  }
+  EXPECT_NEAR(sum_s / (kFrames / 2), 0, 0.0015);
 }
 
 TEST(StampErrors, ASingleWrongStampIsNoEvidence) {
