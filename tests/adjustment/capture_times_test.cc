@@ -100,5 +100,20 @@ TEST(CorrectCaptureTimes, TheVarianceOfOneKeyframeHoldsForAll) {
   EXPECT_LT(time_error_s(draft.map(), made), 0.35 * before);
 }
 
+// Such as those of a fixed keyframe, of whose landmarks other cameras see a few: tracking, which saw all, knows more.
+TEST(CorrectCaptureTimes, ImagesWithFewObservationsInTheProblemKeepTheirCorrections) {
+  constexpr TimeNs kCorrection = 3'000'000;
+  const MapWithWrongStamps made = make_map(kStampDeviation_s * kStampDeviation_s);
+  map::MapDraft draft(std::make_shared<const map::BundledMap>(made.world.map));
+  for (const KeyframeId k : draft.map().keyframe_ids()) draft.correct_times({{k, CameraIndex(1), kCorrection}});
+  Selection few = everything(draft.map());
+  few.landmarks.resize(few.landmarks.size() / 4);
+  ASSERT_TRUE(adjust_map(few, {}, kStampFeatures, draft));
+  std::size_t kept = 0;
+  for (const KeyframeId k : draft.map().keyframe_ids())
+    kept += draft.map().keyframe(k).frame->cameras[1].correction_ns == kCorrection;
+  EXPECT_GT(kept, draft.map().keyframe_ids().size() / 2);
+}
+
 }  // namespace
 }  // namespace bslam::adjustment
