@@ -80,9 +80,9 @@ struct Startup {
 };
 
 // Owns the map and the threads. Only one thread at a time may call process(), finish() and trajectory(); a call during
-// another one returns an error. map(), save_map() and interrupt() may be called from any thread at any time. The
-// destructor stops background work; no other call may be in progress then. A System that was moved from must not be
-// used.
+// another one returns an error. map(), save_map(), calibration_verdict() and interrupt() may be called from any
+// thread at any time. The destructor stops background work; no other call may be in progress then. A System that was
+// moved from must not be used.
 class BSLAM_EXPORT System {
  public:
   // Errors: inconsistent settings (localize_only without a map; calibration.refine=true without final_adjustment, with

@@ -99,7 +99,7 @@ struct System::Impl {
 
   const camera::Rig rig;
   const std::uint64_t vocabulary;
-  mutable std::mutex at_end;  // guards the next two, which finish() changes
+  mutable std::mutex at_end;  // guards `map_warning` and `calibration`, which finish() changes
   std::string map_warning;    // reason why the poses of the map cannot be relied on; may be empty
   system::System system;
   api::BundleReader reader;
