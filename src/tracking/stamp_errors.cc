@@ -22,9 +22,9 @@ constexpr double kExact_s2 = 0.25 * kMillisecond_s2;
 
 bool wrong(const StampErrors& stamps) { return stamps.variance_s2 > kExact_s2; }
 
-// The mean of the errors of a camera after a change of its time offset.
-double mean_s(const StampErrors& stamps, TimeNs time_offset_ns) {
-  return stamps.mean_s - to_seconds(time_offset_ns - stamps.time_offset_ns);
+// The mean of what the stamps of a camera are wrong by, beyond its time offset.
+double mean_error_s(const TrackInput& input, std::size_t camera) {
+  return input.state.stamps[camera].mean_s - to_seconds(input.map.rig().camera(camera).time_offset_ns);
 }
 
 // Per camera, whether the capture time of its image is corrected: its stamps are wrong, and their mean error relative
@@ -46,8 +46,8 @@ ShiftPrior prior_of(const TrackInput& input, const frame::BundledFrame& frame,
   ShiftPrior out(frame.cameras.size());
   for (std::size_t c = 0; c < frame.cameras.size(); ++c) {
     if (!corrected[c]) continue;
-    const double mean = mean_s(input.state.stamps[c], input.map.rig().camera(c).time_offset_ns);
-    out.set(c, input.state.stamps[c].variance_s2, to_seconds(frame.cameras[c].correction_ns) - mean);
+    const double corrected_s = to_seconds(frame.cameras[c].correction_ns) - mean_error_s(input, c);
+    out.set(c, input.state.stamps[c].variance_s2, corrected_s);
   }
   return out;
 }
@@ -77,37 +77,23 @@ std::optional<double> variance_by(const StampError& first, const StampError& mid
   if (!(to_seconds(last.time_ns - first.time_ns) <= kMaxPrediction_s) || middle.time_ns <= first.time_ns)
     return std::nullopt;
   const double b = to_seconds(middle.time_ns - first.time_ns) / to_seconds(last.time_ns - first.time_ns), a = 1 - b;
-  const double difference_s = middle.error_s - a * first.error_s - b * last.error_s;
+  const double difference_s = middle.offset_s - a * first.offset_s - b * last.offset_s;
   const double of_estimates_s2 = middle.variance_s2 + a * a * first.variance_s2 + b * b * last.variance_s2;
   return (difference_s * difference_s - of_estimates_s2) / (1 + a * a + b * b);
 }
 
-// The errors after a change of the time offset of the camera, or of the camera that they are relative to.
-void follow(std::size_t reference, TimeNs time_offset_ns, StampErrors& stamps) {
-  const double change_s = to_seconds(time_offset_ns - stamps.time_offset_ns);
-  stamps.mean_s -= change_s;
-  for (auto* error : {&stamps.last, &stamps.before_last}) {
-    if (*error) (*error)->error_s -= change_s;
-  }
-  stamps.time_offset_ns = time_offset_ns;
-  if (reference == stamps.reference) return;
-  stamps.reference = reference;
-  stamps.mean_s = 0;
-  stamps.count = 0;
-  stamps.last = stamps.before_last = std::nullopt;
-}
-
-// Updates the errors of a camera with that of one image. A single one that is large, which is part of three
-// differences, may be another error, and leaves the stamps exact.
-void update(const StampError& found, StampErrors& stamps) {
+// Updates the errors of a camera with that of one image. Those relative to another camera are forgotten. A single one
+// that is large, which is part of three differences, may be another error, and leaves the stamps exact.
+void update(const StampError& found, std::size_t reference, StampErrors& stamps) {
   constexpr double kRate = 0.1, kRateOfMean = 0.02, kMost_s2 = 2 * kExact_s2, kJump = 9.0;
+  if (reference != stamps.reference) stamps = {stamps.variance_s2, 0, 0, reference, {}, {}};
   const bool known = stamps.last && stamps.before_last;
   if (const auto measured = known ? variance_by(*stamps.before_last, *stamps.last, found) : std::nullopt) {
     const double most = std::max(kMost_s2, kJump * stamps.variance_s2);
     stamps.variance_s2 = std::max(0.0, (1 - kRate) * stamps.variance_s2 + kRate * std::min(*measured, most));
   }
   ++stamps.count;
-  stamps.mean_s += std::max(kRateOfMean, 1.0 / stamps.count) * (found.error_s - stamps.mean_s);
+  stamps.mean_s += std::max(kRateOfMean, 1.0 / stamps.count) * (found.offset_s - stamps.mean_s);
   stamps.before_last = std::exchange(stamps.last, found);
 }
 
@@ -128,7 +114,7 @@ std::vector<TimeNs> correct_capture_times(const TrackInput& input,
   }
   for (std::size_t c = 0; c < frame.cameras.size(); ++c) {
     if (!corrected[c]) continue;
-    frame.cameras[c].correct_time(-mean_s(stamps[c], input.map.rig().camera(c).time_offset_ns));
+    frame.cameras[c].correct_time(-mean_error_s(input, c));
     frame.cameras[c].stamp_variance_s2 = stamps[c].variance_s2;
   }
   return before;
@@ -153,9 +139,8 @@ void update_stamp_errors(const map::BundledMap& map, const frame::BundledFrame& 
   for (std::size_t c = 0; c < cameras; ++c) {
     const auto i = static_cast<Eigen::Index>(c);
     if (c == reference || !(found.variance_s2(i) < kMillisecond_s2)) continue;
-    const double error_s = to_seconds(frame.cameras[c].correction_ns) + found.shift_s(i);
-    follow(reference, map.rig().camera(c).time_offset_ns, stamps[c]);
-    update({error_s, found.variance_s2(i), frame.time_ns}, stamps[c]);
+    const TimeNs offset_ns = map.rig().camera(c).time_offset_ns + frame.cameras[c].correction_ns;
+    update({to_seconds(offset_ns) + found.shift_s(i), found.variance_s2(i), frame.time_ns}, reference, stamps[c]);
   }
 }
 

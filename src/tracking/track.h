@@ -86,19 +86,18 @@ struct DirectState {
   std::shared_ptr<const LocalView> view = {};
 };
 
-// The error of a time stamp that a frame shows.
+// The time offset of an image from its time stamp that a frame shows.
 struct StampError {
-  double error_s = 0, variance_s2 = 0;
+  double offset_s = 0, variance_s2 = 0;
   TimeNs time_ns = 0;  // of the frame
 };
 
 // What the frames so far show of the errors of a camera's time stamps (tracking/stamp_errors.h).
 struct StampErrors {
   double variance_s2 = 0;
-  double mean_s = 0;          // not corrected: it is a time offset, that is part of the calibration
-  int count = 0;              // number of errors in the mean
-  std::size_t reference = 0;  // camera relative to which the errors are
-  TimeNs time_offset_ns = 0;  // of the camera by the calibration with which the errors were found
+  double mean_s = 0;          // of the offsets; not corrected: it is the time offset that belongs to the calibration
+  int count = 0;              // number of offsets in the mean
+  std::size_t reference = 0;  // camera relative to which the offsets are
   std::optional<StampError> last, before_last;
 };
 
