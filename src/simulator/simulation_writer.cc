@@ -129,8 +129,7 @@ class ImageWriter {
 
  private:
   void write_section(std::size_t section, const std::vector<std::size_t>& missing) {
-    const World world(scenery_.building(section), scenery_.world, pool_, stop_);
-    if (stop_.stop_requested()) return;
+    const World world(scenery_.building(section), scenery_.world, pool_);
     const Recorder recorder(world, request_.rig, scenery_.trajectory, request_.imaging, request_.recording.exposure_s,
                             pool_);
     pool_.for_each(missing.size(), [&](std::size_t k) {

@@ -1,4 +1,4 @@
-// Texels of the precomputed albedo.
+// Texels of the albedo of surfaces.
 #pragma once
 
 #include <cstdint>

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <bit>
 #include <cmath>
 #include <limits>
@@ -96,12 +97,18 @@ struct World::Scene {
   RTCScene scene = nullptr;
 };
 
-World::World(Building building, const WorldOptions& options, ThreadPool& pool, std::stop_token stop)
-    : building_(std::move(building)) {
+// How far the albedo and the light of a surface are computed. Its rows are divided into parts.
+struct World::Baking {
+  static constexpr std::int32_t kRows = 64;      // rows of texels per part
+  std::atomic<std::int32_t> next = 0, done = 0;  // parts
+  std::atomic<bool> ready = false;
+};
+
+World::World(Building building, const WorldOptions& options, ThreadPool& pool)
+    : building_(std::move(building)), ambient_rays_(options.ambient_rays) {
   scene_ = std::make_unique<Scene>(building_.surfaces);
   lay_out(options, pool);
-  bake_albedo(pool, stop);
-  bake_light(options, pool, stop);
+  baking_ = std::make_unique<Baking[]>(baked_.size());
 }
 
 World::~World() = default;
@@ -193,68 +200,68 @@ void World::lay_out(const WorldOptions& options, ThreadPool& pool) {
   light_.resize(samples);
 }
 
-void World::bake_albedo(ThreadPool& pool, const std::stop_token& stop) {
-  struct Rows {
-    std::size_t surface;
-    std::int32_t from, to;
-  };
-  constexpr std::int32_t kRows = 64;
-  std::vector<Rows> work;
-  for (std::size_t i = 0; i < baked_.size(); ++i) {
-    for (std::int32_t y = 0; y < baked_[i].height; y += kRows)
-      work.push_back({i, y, std::min(y + kRows, baked_[i].height)});
+const World::Baked& World::baked(std::size_t surface) const {
+  Baking& baking = baking_[surface];
+  if (!baking.ready.load(std::memory_order_acquire)) bake(surface, baking);
+  return baked_[surface];
+}
+
+void World::bake(std::size_t surface, Baking& baking) const {
+  const Baked& b = baked_[surface];
+  const std::int32_t parts = (b.height + Baking::kRows - 1) / Baking::kRows;
+  for (std::int32_t part = baking.next++; part < parts; part = baking.next++) {
+    bake_albedo(surface, part * Baking::kRows, std::min((part + 1) * Baking::kRows, b.height));
+    bake_light(surface, part * b.light_height / parts, (part + 1) * b.light_height / parts);
+    if (++baking.done < parts) continue;
+    build_pyramid(b);
+    baking.ready.store(true, std::memory_order_release);
+    baking.ready.notify_all();
   }
-  pool.for_each(work.size(), [&](std::size_t item) {
-    if (stop.stop_requested()) return;
-    const Rows& rows = work[item];
-    const Surface& s = building_.surfaces[rows.surface];
-    const Baked& b = baked_[rows.surface];
-    const Vector2f size(static_cast<float>(s.u.norm()), static_cast<float>(s.v.norm()));
-    const Vector2f texels(static_cast<float>(b.width), static_cast<float>(b.height));
-    for (std::int32_t y = rows.from; y < rows.to; ++y) {
-      std::uint8_t* out = texels_.data() + b.texel[0] + static_cast<std::size_t>(y) * static_cast<std::size_t>(b.width);
-      for (std::int32_t x = 0; x < b.width; ++x) {
-        const float mean = mean_albedo(s, static_cast<float>(x), static_cast<float>(y), size, texels, b.samples);
-        out[x] = static_cast<std::uint8_t>(255.0f * std::sqrt(mean) + 0.5f);
-      }
-    }
-  });
-  pool.for_each(baked_.size(), [&](std::size_t i) {
-    const Baked& b = baked_[i];
-    for (std::int32_t level = 1; level < b.levels; ++level) {
-      const TexelGrid fine{((b.width - 1) >> (level - 1)) + 1, ((b.height - 1) >> (level - 1)) + 1};
-      const TexelGrid coarse{((b.width - 1) >> level) + 1, ((b.height - 1) >> level) + 1};
-      halve(texels_.data() + b.texel[level - 1], fine, texels_.data() + b.texel[level], coarse);
-    }
-  });
+  baking.ready.wait(false, std::memory_order_acquire);
 }
 
-void World::bake_light(const WorldOptions& options, ThreadPool& pool, const std::stop_token& stop) {
-  pool.for_each(baked_.size(), [&](std::size_t i) {
-    const Surface& s = building_.surfaces[i];
-    const Baked& b = baked_[i];
-    const Vector3d normal = unit_normal(s);
-    std::optional<float> constant = uniform_light(s.texture.material);
-    if (b.hidden && !constant) constant = kAmbient;
-    for (std::int32_t y = 0; y < b.light_height && !stop.stop_requested(); ++y) {
-      for (std::int32_t x = 0; x < b.light_width; ++x) {
-        const std::size_t at = b.light + static_cast<std::size_t>(y * b.light_width + x);
-        if (constant) {
-          light_[at] = *constant;
-          continue;
-        }
-        // Samples are slightly inside the edges, so that neighbouring surfaces do not cover them.
-        const auto inset = [](std::int32_t k, std::int32_t count) {
-          return std::clamp(static_cast<double>(k) / (count - 1), 0.02, 0.98);
-        };
-        const Vector3d point = s.origin + inset(x, b.light_width) * s.u + inset(y, b.light_height) * s.v;
-        light_[at] = light_at(point, normal, options.ambient_rays);
-      }
+void World::bake_albedo(std::size_t surface, std::int32_t from, std::int32_t to) const {
+  const Surface& s = building_.surfaces[surface];
+  const Baked& b = baked_[surface];
+  const Vector2f size(static_cast<float>(s.u.norm()), static_cast<float>(s.v.norm()));
+  const Vector2f texels(static_cast<float>(b.width), static_cast<float>(b.height));
+  for (std::int32_t y = from; y < to; ++y) {
+    std::uint8_t* out = texels_.data() + b.texel[0] + static_cast<std::size_t>(y) * static_cast<std::size_t>(b.width);
+    for (std::int32_t x = 0; x < b.width; ++x) {
+      const float mean = mean_albedo(s, static_cast<float>(x), static_cast<float>(y), size, texels, b.samples);
+      out[x] = static_cast<std::uint8_t>(255.0f * std::sqrt(mean) + 0.5f);
     }
-  });
+  }
 }
 
-float World::light_at(const Vector3d& point, const Vector3d& n, int ambient_rays) const {
+void World::build_pyramid(const Baked& b) const {
+  for (std::int32_t level = 1; level < b.levels; ++level) {
+    const TexelGrid fine{((b.width - 1) >> (level - 1)) + 1, ((b.height - 1) >> (level - 1)) + 1};
+    const TexelGrid coarse{((b.width - 1) >> level) + 1, ((b.height - 1) >> level) + 1};
+    halve(texels_.data() + b.texel[level - 1], fine, texels_.data() + b.texel[level], coarse);
+  }
+}
+
+void World::bake_light(std::size_t surface, std::int32_t from, std::int32_t to) const {
+  const Surface& s = building_.surfaces[surface];
+  const Baked& b = baked_[surface];
+  const Vector3d normal = unit_normal(s);
+  std::optional<float> constant = uniform_light(s.texture.material);
+  if (b.hidden && !constant) constant = kAmbient;
+  // Samples are slightly inside the edges, so that neighbouring surfaces do not cover them.
+  const auto inset = [](std::int32_t k, std::int32_t count) {
+    return std::clamp(static_cast<double>(k) / (count - 1), 0.02, 0.98);
+  };
+  for (std::int32_t y = from; y < to; ++y) {
+    for (std::int32_t x = 0; x < b.light_width; ++x) {
+      const Vector3d point = s.origin + inset(x, b.light_width) * s.u + inset(y, b.light_height) * s.v;
+      light_[b.light + static_cast<std::size_t>(y * b.light_width + x)] =
+          constant ? *constant : light_at(point, normal);
+    }
+  }
+}
+
+float World::light_at(const Vector3d& point, const Vector3d& n) const {
   // All samples use the same pattern of rays, since noise between samples would be visible as stains.
   const Vector3d start = point + kOffSurface * n;
   double light = 0;
@@ -274,12 +281,12 @@ float World::light_at(const Vector3d& point, const Vector3d& n, int ambient_rays
   }
   int open = 0;
   const Vector3d side = n.unitOrthogonal(), up = n.cross(side);
-  for (int k = 0; k < ambient_rays; ++k) {  // cosine-weighted directions on a Fibonacci spiral
-    const double r2 = (k + 0.5) / ambient_rays, r = std::sqrt(r2), angle = 2.399963 * k;
+  for (int k = 0; k < ambient_rays_; ++k) {  // cosine-weighted directions on a Fibonacci spiral
+    const double r2 = (k + 0.5) / ambient_rays_, r = std::sqrt(r2), angle = 2.399963 * k;
     const Vector3d d = r * std::cos(angle) * side + r * std::sin(angle) * up + std::sqrt(1 - r2) * n;
     if (!blocked(start, start + kAmbientReach * d)) ++open;
   }
-  const double enclosed = ambient_rays > 0 ? static_cast<double>(open) / ambient_rays : 1.0;
+  const double enclosed = ambient_rays_ > 0 ? static_cast<double>(open) / ambient_rays_ : 1.0;
   return static_cast<float>(light + kAmbient * (0.25 + 0.75 * enclosed));
 }
 
@@ -329,7 +336,7 @@ float World::lookup(const Baked& b, float a, float v, int level) const {
 }
 
 float World::radiance(const Hit& hit, double footprint) const {
-  const Baked& b = baked_[hit.surface];
+  const Baked& b = baked(hit.surface);
   return lookup(b, static_cast<float>(hit.a), static_cast<float>(hit.b),
                 level_of(static_cast<float>(footprint) * b.texels_per_m, b.levels));
 }
@@ -361,7 +368,7 @@ void World::radiance(const Eigen::Vector3f& origin, const RayPacket& rays, float
       out[i] = 0.02f;
       continue;
     }
-    const Baked& b = baked_[query.hit.primID[i]];
+    const Baked& b = baked(query.hit.primID[i]);
     const float cosine = std::abs(b.normal.x() * rays.x[i] + b.normal.y() * rays.y[i] + b.normal.z() * rays.z[i]);
     // The footprint of an oblique ray is longer in one direction; its geometric mean is used.
     const float texels = query.ray.tfar[i] * scale * b.texels_per_m / std::sqrt(std::max(cosine, 0.02f));

@@ -1,11 +1,11 @@
-// The textured and lit world for ray casting: geometry in Embree, precomputed albedo pyramids and precomputed light.
+// The textured and lit world for ray casting: geometry in Embree, and per surface a pyramid of albedo and a grid of
+// light, which are computed when they are first looked up.
 #pragma once
 
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <span>
-#include <stop_token>
 #include <vector>
 
 #include "base/thread_pool.h"
@@ -41,9 +41,8 @@ struct RayPacket {
 
 class World {
  public:
-  // Builds the scene and precomputes albedo and light with the threads of `pool`, whose number does not affect the
-  // result. If a stop is requested, returns soon with an incomplete world that must not be used.
-  World(Building building, const WorldOptions& options, ThreadPool& pool, std::stop_token stop = {});
+  // Builds the scene with the threads of `pool`, whose number does not affect the result.
+  World(Building building, const WorldOptions& options, ThreadPool& pool);
   ~World();
   World(World&&) noexcept;
   World& operator=(World&&) noexcept;
@@ -53,7 +52,8 @@ class World {
   // Returns the first intersection of a ray, or nullopt if it leaves the world. `direction` is a unit vector.
   std::optional<Hit> cast(const Vector3d& origin, const Vector3d& direction) const;
 
-  // Returns the radiance of a surface at a point, averaged over `footprint` metres. 0.15 is about medium grey.
+  // Returns the radiance of a surface at a point, averaged over `footprint` metres. 0.15 is about medium grey. As the
+  // function below, computes albedo and light of a surface first if nobody asked for it before.
   float radiance(const Hit& hit, double footprint) const;
 
   // Computes the radiance at the end of eight rays, averaged over `spread` radians around each. `detail` in [0, 1)
@@ -63,9 +63,10 @@ class World {
 
  private:
   struct Scene;
+  struct Baking;
   static constexpr int kLevels = 10;
 
-  // Position of the precomputed data of a surface in the shared arrays.
+  // Position of the albedo and the light of a surface in the shared arrays.
   struct Baked {
     Eigen::Vector3f normal;
     std::int32_t width, height;  // texels of the finest level
@@ -85,17 +86,23 @@ class World {
   // Whether no ray from some points of a surface reaches the tour.
   bool hidden_by_others(const Surface& surface) const;
   void lay_out(const WorldOptions& options, ThreadPool& pool);
-  void bake_albedo(ThreadPool& pool, const std::stop_token& stop);
-  void bake_light(const WorldOptions& options, ThreadPool& pool, const std::stop_token& stop);
+  // The data of a surface, which are computed by the first call. Threads that need one surface share its rows.
+  const Baked& baked(std::size_t surface) const;
+  void bake(std::size_t surface, Baking& baking) const;
+  void bake_albedo(std::size_t surface, std::int32_t from, std::int32_t to) const;  // rows of texels
+  void bake_light(std::size_t surface, std::int32_t from, std::int32_t to) const;   // rows of samples
+  void build_pyramid(const Baked& baked) const;
   // Irradiance at a point of a surface with normal `n`.
-  float light_at(const Vector3d& point, const Vector3d& n, int ambient_rays) const;
+  float light_at(const Vector3d& point, const Vector3d& n) const;
   bool blocked(const Vector3d& from, const Vector3d& to) const;
   float lookup(const Baked& baked, float a, float b, int level) const;
 
   Building building_;
+  int ambient_rays_;
   std::vector<Baked> baked_;
-  std::vector<std::uint8_t> texels_;  // 255 * sqrt(albedo)
-  std::vector<float> light_;
+  std::unique_ptr<Baking[]> baking_;          // by surface
+  mutable std::vector<std::uint8_t> texels_;  // 255 * sqrt(albedo); of baked surfaces
+  mutable std::vector<float> light_;          // of baked surfaces
   std::unique_ptr<Scene> scene_;
 };
 

@@ -130,7 +130,7 @@ TEST_F(SimulationWriter, RendersACompleteRequestOnlyOnce) {
   EXPECT_EQ(*again, SimulationOutcome::kWasComplete);
 }
 
-TEST_F(SimulationWriter, StopsWhileBuildingTheWorld) {
+TEST_F(SimulationWriter, StopsBeforeTheFirstImage) {
   const SimulationRequest r = request();
   std::stop_source source;
   source.request_stop();
