@@ -54,8 +54,15 @@ CalibrationReport report_calibration(const system::System& system, const camera:
     if (pair.contradicted && report.doubt.empty()) report.doubt = report.warnings.back();
   }
   if (!report.doubt.empty()) return report;  // the estimate is meaningless
-  if (pairs.empty()) report.verdict = to_verdict(estimate.verdict);
-  warn_of_extrinsics(given, estimate, report.warnings);
+  const bool jumped = estimate.jump && estimate.verdict == calibration::Verdict::kConsistent;
+  if (pairs.empty() && !jumped) report.verdict = to_verdict(estimate.verdict);
+  if (estimate.jump) {
+    report.warnings.push_back(
+        calibration::time_jump_text(given.camera(estimate.jump->camera).name, *estimate.jump,
+                                    fmt::format("the time stamp {:.3f} s", to_seconds(estimate.jump->time_ns))));
+  } else {
+    warn_of_extrinsics(given, estimate, report.warnings);
+  }
   std::ranges::move(calibration::deviation_warnings(given, estimate), std::back_inserter(report.warnings));
   if (estimate.verdict != calibration::Verdict::kInconsistent) return report;
   const std::string text = calibration::contradiction_text(estimate);

@@ -95,6 +95,7 @@ std::vector<std::string> deviation_warnings(const camera::Rig& rig, const RigRef
   std::vector<std::string> warnings;
   for (std::size_t c = 0; c < std::min(estimate.cameras.size(), rig.size()); ++c) {
     const camera::Camera& camera = rig.camera(c);
+    if (estimate.jump && estimate.jump->camera == c) continue;
     if (estimate.verdict == Verdict::kInconsistent) {
       warn_of_intrinsics(camera, estimate.cameras[c], warnings);
       warn_of_wrong_focal_length(camera, estimate.cameras[c], warnings);
@@ -103,6 +104,13 @@ std::vector<std::string> deviation_warnings(const camera::Rig& rig, const RigRef
     warn_of_timing(camera.name, estimate.cameras[c], warnings);
   }
   return warnings;
+}
+
+std::string time_jump_text(const std::string& camera, const TimeJump& jump, const std::string& when) {
+  return fmt::format(
+      "{}: from about {} on, its images seem to have been taken {} than their time stamps say, compared with those "
+      "before: check the time stamps of its images, and whether it lost or repeated some",
+      camera, when, jump.shift_s > 0 ? "later" : "earlier");
 }
 
 std::string extrinsics_text(const std::string& camera, double change_deg, double change_mm) {

@@ -10,6 +10,7 @@
 namespace bslam::calibration {
 
 inline constexpr int kMinObservations = 20;  // of an image that determines the extrinsics of its camera
+inline constexpr int kMinKeyframes = 3;      // with enough observations, before and after a change of a camera
 
 // The normal equations of the extrinsics of a camera (a left perturbation of T_cam_rig, rad and metres), from its
 // observations in one or several keyframes. Errors are in standard deviations.

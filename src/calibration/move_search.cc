@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "calibration/deviation.h"
@@ -20,6 +21,8 @@ constexpr double kMinMoveSigmas = 6, kMinTurn_deg = 0.04, kMinShift_mm = 5;
 // and displacement are then too small, because poses and points were adjusted as if there was no move. They are
 // multiplied by kHidden before they are compared with the bounds above.
 constexpr double kMinMoveChi2 = 50, kHidden = 6;
+// A jump of the time stamps of a camera, of which a part is hidden as well
+constexpr double kMinJump_s = 0.5e-3;
 
 // Move m of an estimate. `covariance`: of RigInformation::change.
 MoveEstimate move_of(const RigEstimate& estimate, const Eigen::MatrixXd& covariance, std::size_t m) {
@@ -77,6 +80,18 @@ std::optional<PossibleMove> likely_move(const EstimateInput& input, const RigEst
     if (!best || move.chi2 > best->chi2) best = move;
   }
   return best;
+}
+
+// The jump of the time stamps of a camera that explains what the images show better than the move does, although it has
+// one unknown instead of six. If the rig moves steadily, both explain it equally well.
+std::optional<TimeJump> jump_instead(const EstimateInput& input, const RigEstimate& estimate,
+                                     const PossibleMove& move) {
+  const auto begin = begin_of_run(input);
+  if (!begin || input.map.rig().size() < 2) return std::nullopt;
+  auto jump = likely_jump(input.map, estimate.problem, estimate.adjusted.values, move.camera, *begin);
+  if (!jump || jump->chi2 <= move.chi2 || std::abs(jump->shift_s) < kMinJump_s) return std::nullopt;
+  jump->camera = estimate.cameras.camera_of_rig(move.camera);
+  return jump;
 }
 
 // Returns true if these are moves of the same cameras at the same times.
@@ -167,6 +182,10 @@ RigEstimate estimate_rig_and_moves(const EstimateInput& input, const RigAdjustme
     const RigEstimate& before = latest ? *latest : known;
     const auto move = likely_move(input, before, dropped);
     if (!move) break;
+    if (auto jump = jump_instead(input, before, *move)) {
+      known.jump = std::move(jump);
+      return known;
+    }
     if (found == kMaxMoves || search.exhausted()) return known;  // something else than moves
     RigEstimate next = search.estimate_with(before, *move);
     if (next.adjusted.done && !same_moves(next.cameras.moves(), before.cameras.moves())) {
@@ -178,7 +197,8 @@ RigEstimate estimate_rig_and_moves(const EstimateInput& input, const RigAdjustme
       ++failed;
     }
   }
-  return latest ? *std::move(latest) : std::move(known);
+  // A search that was stopped may have found moves at wrong times.
+  return latest && !input.stop.stop_requested() ? *std::move(latest) : std::move(known);
 }
 
 }  // namespace bslam::calibration

@@ -12,8 +12,6 @@ namespace {
 using geometry::SE3;
 using geometry::Vector6d;
 
-constexpr int kMinKeyframes = 3;  // with enough observations, before and after a move
-
 using Observation = solver::ReprojectionProblem::Observation;
 
 // The cost of an observation with the extrinsics of camera c of the problem.

@@ -29,6 +29,10 @@ class MovedCameras {
   const std::vector<camera::CameraMove>& moves() const { return moves_; }
   // The camera of the problem that a camera of the rig is just before move m.
   std::size_t before(std::size_t m) const;
+  // The camera of the rig that a camera of the problem is.
+  std::size_t camera_of_rig(std::size_t camera) const {
+    return camera < cameras_ ? camera : moves_[camera - cameras_].camera;
+  }
 
   // Adds the cameras to a rig without moves, whose rig frame is that of camera 0, with the extrinsics before the moves;
   // to the values of a rig, with the extrinsics after them; and to options of an adjustment.

@@ -7,6 +7,7 @@
 
 #include "calibration/moved_camera.h"
 #include "calibration/rig_problem.h"
+#include "calibration/time_jump.h"
 
 namespace bslam::calibration {
 
@@ -28,6 +29,8 @@ struct RigEstimate {
   // False if the extrinsics still changed by more than their uncertainty when rejected observations had been searched
   // for several times: the calibration is far off, or the images do not belong to it.
   bool settled = false;
+  // The time stamps of a camera seem to have changed during the run; no moves are then part of the estimate.
+  std::optional<TimeJump> jump = {};
   double path_before = 0;  // path_length() with the rig of the map
 };
 

@@ -129,7 +129,8 @@ RigRefinement evaluate(const EstimateInput& input, RigEstimate&& estimate) {
     if (c > 0) evaluate_extrinsics(adjusted.cameras[c], input.options, camera);
     evaluate_timing(adjusted.cameras[c], camera);
   }
-  out.implausible = is_implausible(out.cameras, input.calibrated);
+  out.jump = estimate.jump;
+  out.implausible = out.jump || is_implausible(out.cameras, input.calibrated);
   out.moves = moves_of(estimate);
   out.excess_error = adjusted.excess_error;
   out.verdict = out.excess_error > input.options.inconsistent_excess ? Verdict::kInconsistent : Verdict::kConsistent;

@@ -11,6 +11,7 @@
 
 #include "base/options.h"
 #include "calibration/rig_bundle_adjustment.h"
+#include "calibration/time_jump.h"
 #include "map/map_edit.h"
 
 namespace bslam::calibration {
@@ -160,8 +161,10 @@ struct MoveEstimate {
 };
 
 struct RigRefinement {
-  bool done = false;         // false: several cameras without metric scale, too few observations, stopped or failed
-  bool implausible = false;  // some camera was displaced by much that the images do not constrain; never accepted
+  bool done = false;  // false: several cameras without metric scale, too few observations, stopped or failed
+  // Some camera was displaced by much that the images do not constrain, or its time stamps changed; never accepted.
+  bool implausible = false;
+  std::optional<TimeJump> jump;              // its time stamps seem to have changed during the run
   std::vector<CameraRefinement> cameras;     // all cameras in the order of the rig, if done
   std::vector<MoveEstimate> moves;           // in order of time; the extrinsics in `cameras` are those before them
   std::size_t keyframes = 0, landmarks = 0;  // numbers of keyframes and landmarks used

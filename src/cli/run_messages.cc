@@ -64,6 +64,9 @@ std::string doubt_text(const session::RunRecord& record) {
   if (const auto& late = record.calibration.late)
     text += fmt::format("{}{} is about one frame {}", text.empty() ? "" : ", ", record.cameras[late->camera].name,
                         late->early ? "early" : "late");
+  else if (const auto& jump = record.calibration.estimate.jump)
+    text += fmt::format("{}the time stamps of {} seem to have changed", text.empty() ? "" : ", ",
+                        record.cameras[jump->camera].name);
   for (const std::size_t c : record.calibration.disagreeing)
     text +=
         fmt::format("{}{} shows other things than the map predicts", text.empty() ? "" : ", ", record.cameras[c].name);

@@ -16,10 +16,12 @@ void warn_of_extrinsics(const CameraRecord& camera, bool advise, Warnings& warni
        advise && !e->refined ? "; use the estimate with --set calibration.refine=true" : "");
 }
 
-// Warns of cameras that were moved during the run. Of two cameras, it is not known which one was moved.
+// Warns of cameras that were moved during the run. Of two cameras, it is not known which one was moved. What looks like
+// moves of a camera whose images are late is not said.
 void warn_of_moves(const RunRecord& record, Warnings& warnings) {
+  const auto& late = record.calibration.late;
   for (const CameraMoveRecord& move : record.calibration.moves) {
-    if (move.camera >= record.cameras.size()) continue;
+    if (move.camera >= record.cameras.size() || (late && late->camera == move.camera)) continue;
     warn(warnings,
          "{}: moved relative to {} at about {:.1f} s, by {:.2f} deg (std {:.2f}) and {:.1f} mm (std {:.1f}); {}",
          record.cameras[move.camera].name, record.cameras.size() == 2 ? record.cameras[0].name : "the other cameras",
@@ -28,6 +30,20 @@ void warn_of_moves(const RunRecord& record, Warnings& warnings) {
          : record.calibration.refined     ? "the map takes this into account, and rig_refined.yaml is the rig after it"
                                           : "the map takes this into account");
   }
+}
+
+// Warns of a camera whose time stamps changed during the run, unless another warning says by how much.
+void warn_of_time_jump(const RunRecord& record, Warnings& warnings) {
+  const auto& jump = record.calibration.estimate.jump;
+  if (!jump || jump->camera >= record.cameras.size() || record.calibration.late) return;
+  warnings.push_back(calibration::time_jump_text(record.cameras[jump->camera].name, *jump,
+                                                 fmt::format("{:.1f} s", record.calibration.jump_at_s)));
+}
+
+// Returns true if the time stamps of a camera changed during the run, which also displaces its extrinsics.
+bool has_time_jump(const RunRecord& record, const CameraRecord& camera) {
+  const auto& jump = record.calibration.estimate.jump;
+  return jump && jump->camera == static_cast<std::size_t>(&camera - record.cameras.data());
 }
 
 std::string what_became_of_estimate(const RunRecord& record) {
@@ -41,6 +57,7 @@ std::string what_became_of_estimate(const RunRecord& record) {
         "other times than those of the other cameras",
         record.cameras[late->camera].name);
   }
+  if (calibration.estimate.jump) return "the estimate is not used, since the time stamps of a camera changed";
   return "the estimate cannot be used for other recordings, because the images of some cameras disagree as a whole: "
          "their time stamps or extrinsics may be far off";
 }
@@ -57,8 +74,10 @@ std::vector<std::string> estimate_warnings(const RunRecord& record, const camera
   Warnings warnings;
   const bool contradicted = calibration.estimate.verdict == calibration::Verdict::kInconsistent;
   warn_of_moves(record, warnings);
-  for (const CameraRecord& camera : record.cameras)
-    warn_of_extrinsics(camera, calibration.applies && !contradicted, warnings);
+  warn_of_time_jump(record, warnings);
+  for (const CameraRecord& camera : record.cameras) {
+    if (!has_time_jump(record, camera)) warn_of_extrinsics(camera, calibration.applies && !contradicted, warnings);
+  }
   const std::vector<std::string> deviations = calibration::deviation_warnings(rig, calibration.estimate);
   warnings.insert(warnings.end(), deviations.begin(), deviations.end());
   if (contradicted) warn(warnings, "{}; {}", contradiction_text(record), what_became_of_estimate(record));

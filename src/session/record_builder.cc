@@ -107,7 +107,7 @@ bool single_camera_agrees(const RunRecord& record) {
 
 // Returns true if there is evidence against the calibration or the time stamps.
 bool is_contradicted(const CalibrationRecord& calibration) {
-  return !calibration.pairs.empty() || !calibration.disagreeing.empty() ||
+  return !calibration.pairs.empty() || !calibration.disagreeing.empty() || calibration.estimate.jump ||
          calibration.estimate.verdict == calibration::Verdict::kInconsistent;
 }
 
@@ -118,6 +118,7 @@ void add_calibration(const RecordInput& input, RunRecord& record) {
   calibration.moves_in_map = !input.system.rig().moves().empty();
   for (const calibration::MoveEstimate& m : calibration.estimate.moves)
     calibration.moves.push_back({m.camera, seconds(input, m.time_ns), m.change_deg, m.std_deg, m.change_mm, m.std_mm});
+  if (const auto& jump = calibration.estimate.jump) calibration.jump_at_s = seconds(input, jump->time_ns);
   const bool suspected = calibration.estimate.verdict == calibration::Verdict::kInconsistent;
   calibration.pairs =
       calibration::disagreeing_pairs(*input.system.snapshot(), input.system.first_keyframe(),

@@ -23,7 +23,8 @@ bool CalibrationRecord::foreign_images() const {
 calibration::Verdict CalibrationRecord::verdict() const {
   if (foreign_images()) return calibration::Verdict::kInconsistent;
   if (estimate.verdict != calibration::Verdict::kConsistent) return estimate.verdict;
-  return pairs.empty() && disagreeing.empty() && !late ? estimate.verdict : calibration::Verdict::kUnknown;
+  return pairs.empty() && disagreeing.empty() && !late && !estimate.jump ? estimate.verdict
+                                                                         : calibration::Verdict::kUnknown;
 }
 
 double MemoryReport::sum_mb() const {

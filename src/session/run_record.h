@@ -88,6 +88,7 @@ struct CalibrationRecord {
   // fit wrong matches, or images that were taken at different times.
   bool applies = false;
   std::vector<CameraMoveRecord> moves = {};
+  double jump_at_s = 0.0;     // time of estimate.jump
   bool moves_in_map = false;  // the map has extrinsics before and after the moves
   bool refined = false;       // the final map uses an estimated rig that applies, which is written to rig_refined.yaml
   double excess_bound = 0;    // the images contradict the calibration if estimate.excess_error is larger

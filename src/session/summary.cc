@@ -120,6 +120,14 @@ ordered_json late_json(const RunRecord& record) {
       {{"name", record.cameras[late->camera].name}, {"reference", record.cameras[late->reference].name}}, *late);
 }
 
+ordered_json time_jump_json(const RunRecord& record) {
+  const auto& jump = record.calibration.estimate.jump;
+  if (!jump || jump->camera >= record.cameras.size()) return nullptr;
+  return {{"camera", record.cameras[jump->camera].name},
+          {"at", seconds(record.calibration.jump_at_s)},
+          {"taken", jump->shift_s > 0 ? "later" : "earlier"}};
+}
+
 ordered_json calibration_json(const RunRecord& record) {
   const calibration::RigRefinement& estimate = record.calibration.estimate;
   ordered_json cameras = ordered_json::array();
@@ -152,6 +160,7 @@ ordered_json calibration_json(const RunRecord& record) {
           {"disagreeing", disagreeing},
           {"late_camera", late_json(record)},
           {"moves", moves},
+          {"time_jump", time_jump_json(record)},
           {"refined", record.calibration.refined},
           {"cameras", cameras}};
 }

@@ -72,6 +72,34 @@ TEST(RunWarnings, AMovedCameraIsNamedWithWhatBecameOfTheMove) {
   }
 }
 
+// What looks like moves of a camera whose images are late is not said, nor what its extrinsics seem to be.
+TEST(RunWarnings, ACameraWhoseTimeStampsChangedIsNamedInsteadOfItsMoves) {
+  RunRecord record;
+  record.complete = true;
+  record.cameras.resize(2);
+  record.cameras[0].name = "left";
+  record.cameras[1].name = "right";
+  record.cameras[1].extrinsics = ExtrinsicsRecord{.change_deg = 0.7, .change_mm = 12, .suspect = true};
+  record.calibration.estimate.verdict = calibration::Verdict::kConsistent;
+  record.calibration.estimate.done = record.calibration.estimate.implausible = true;
+  record.calibration.estimate.jump = calibration::TimeJump{.camera = 1, .shift_s = -0.007};
+  record.calibration.jump_at_s = 6.04;
+  record.calibration.accept_estimate(true, true);
+  EXPECT_FALSE(record.calibration.applies);
+  EXPECT_EQ(record.calibration.verdict(), calibration::Verdict::kUnknown);
+  const camera::Rig rig = synthetic::ring_rig(2);
+  std::vector<std::string> warnings = warnings_after_run(record, rig, "");
+  EXPECT_TRUE(has_text(warnings, "right: from about 6.0 s on, its images seem to have been taken earlier"));
+  EXPECT_FALSE(has_text(warnings, "estimated extrinsics"));
+  // The test of images says it more exactly.
+  record.calibration.late = calibration::LateCamera{1, 0, false, 90, 20, 100, 95, "last half"};
+  record.calibration.moves = {{1, 6.75, 0.70, 0.03, 83.3, 4.2}};
+  warnings = warnings_after_run(record, rig, "");
+  EXPECT_TRUE(has_text(warnings, "right: its images are about one frame late"));
+  EXPECT_FALSE(has_text(warnings, "from about"));
+  EXPECT_FALSE(has_text(warnings, "moved relative"));
+}
+
 TEST(RunWarnings, ErrorsOfTimeStampsThatWereCorrectedAreSaid) {
   const camera::Rig rig = synthetic::ring_rig(2);
   RunRecord record;
