@@ -146,7 +146,7 @@ Status System::Impl::finish() {
     api::CalibrationReport report = api::report_calibration(system, rig);
     const std::lock_guard lock(at_end);
     calibration = std::move(report);
-    if (map_warning.empty()) map_warning = calibration.doubt;
+    map_warning = storage::joined_warnings(map_warning, calibration.doubt);
     return {};
   });
   if (!done) {

@@ -96,10 +96,12 @@ Result<session::MergeResult> merge(const MergeArguments& arguments, const place:
   return merged;
 }
 
-Status write(const session::MergeResult& merged, const std::vector<std::string>& warnings, const std::string& file) {
+Status write(const session::MergeResult& merged, const std::string& file) {
   std::vector<std::string> recordings;
   for (const session::MergedInput& input : merged.inputs) recordings.push_back(input.data);
-  const storage::MapFileInfo info{merged.vocabulary, version_number(), fmt::format("{}", fmt::join(recordings, " + ")),
+  const std::vector<std::string> warnings = session::warnings_of(merged, &session::MergedInput::data);
+  const storage::MapFileInfo info{merged.vocabulary, version_number(),
+                                  fmt::format("{}", fmt::join(recordings, session::kBetweenRecordings)),
                                   fmt::format("{}", fmt::join(warnings, "; "))};
   return storage::write_map(merged.map, info, file);
 }
@@ -125,11 +127,11 @@ int map_merge(const MergeArguments& arguments) {
     const int status = report_error(merged.error());
     return interruption.token().stop_requested() ? kExitInterrupted : status;
   }
-  const std::vector<std::string> warnings = session::warnings_of(*merged);
   if (!arguments.dry_run) {
-    if (const Status s = write(*merged, warnings, arguments.out); !s) return report_error(s.error());
+    if (const Status s = write(*merged, arguments.out); !s) return report_error(s.error());
   }
-  for (const std::string& warning : warnings) print_message("warning: {}\n", warning);
+  for (const std::string& warning : session::warnings_of(*merged, &session::MergedInput::file))
+    print_message("warning: {}\n", warning);
   arguments.json ? print_json(*merged) : print_text(*merged);
   if (!arguments.dry_run && !arguments.json) fmt::print("{}\n", arguments.out);
   return kExitOk;

@@ -112,8 +112,8 @@ Result<std::optional<storage::SavedMap>> read_map(const SlamArguments& arguments
 // The metadata stored with the map of a run. `map_warning`: the warning stored in the map that it continued.
 storage::MapFileInfo map_info(const session::RunRecord& record, const place::Vocabulary& vocabulary,
                               const std::string& map_warning) {
-  const std::string warning = session::unreliable_map_text(record);
-  return {vocabulary.id(), record.version, record.data, warning.empty() ? map_warning : warning};
+  return {vocabulary.id(), record.version, record.data,
+          storage::joined_warnings(map_warning, session::unreliable_map_text(record))};
 }
 
 // Whether a file that was asked for is written.

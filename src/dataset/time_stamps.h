@@ -13,7 +13,8 @@
 
 namespace bslam::dataset {
 
-constexpr TimeNs kMaxTime = 9'200'000'000'000'000'000;  // time offsets can be added without overflow
+// Nanoseconds; time offsets can be added and differences taken without overflow, and maps can store it.
+constexpr TimeNs kMaxTime = 4'000'000'000'000'000'000;
 // Median intervals between the images of a camera that are outside of these bounds are those of another unit.
 constexpr TimeNs kShortestInterval = 500'000;        // nanoseconds; cameras of 2 kHz
 constexpr TimeNs kLongestInterval = 20'000'000'000;  // nanoseconds

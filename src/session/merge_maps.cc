@@ -188,16 +188,19 @@ Result<MergeResult> merge_maps(std::vector<SavedMap> maps, const place::Vocabula
   return result;
 }
 
-std::vector<std::string> warnings_of(const MergeResult& merged) {
+std::vector<std::string> warnings_of(const MergeResult& merged, std::string MergedInput::*name) {
   std::vector<std::string> out;
-  for (const MergedInput& input : merged.inputs)
-    if (!input.warning.empty()) out.push_back(input.file + ": " + input.warning);
+  for (const MergedInput& input : merged.inputs) {
+    if (input.warning.empty()) continue;
+    const bool named = input.data.find(kBetweenRecordings) != std::string::npos;  // each warning names its recording
+    out.push_back(named ? input.warning : input.*name + ": " + input.warning);
+  }
   for (const ScaleComparison& c : merged.scales) {
     if (!c.disagrees()) continue;
     out.push_back(
         fmt::format("the scales of {} and {} disagree: lengths are {:.2f} % {} in the second (std {:.2f} %); no map "
                     "was scaled, so the merged map is distorted: check the baselines of both calibrations",
-                    merged.inputs[c.first].file, merged.inputs[c.second].file, 100 * std::abs(c.ratio - 1),
+                    merged.inputs[c.first].*name, merged.inputs[c.second].*name, 100 * std::abs(c.ratio - 1),
                     c.ratio > 1 ? "longer" : "shorter", 100 * c.deviation));
   }
   return out;

@@ -5,6 +5,7 @@
 #include <span>
 #include <stop_token>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "map/bundled_map.h"
@@ -42,9 +43,13 @@ struct MergeResult {
 Result<MergeResult> merge_maps(std::vector<storage::SavedMap> maps, const place::VocabularyPtr& vocabulary,
                                const system::Config& config, const std::stop_token& interrupted = {});
 
-// Reasons why the poses of the merged map cannot be relied on: those of the inputs, with their files, and scales that
-// disagree. The maps are not scaled: metric maps whose scales differ contain a wrong calibration.
-std::vector<std::string> warnings_of(const MergeResult& merged);
+// In MergedInput::data of a merged map
+inline constexpr std::string_view kBetweenRecordings = " + ";
+
+// Reasons why the poses of the merged map cannot be relied on: those of the inputs, and scales that disagree. The maps
+// are not scaled: metric maps whose scales differ contain a wrong calibration. `name`: how inputs are named, by `file`
+// or, in what is stored, by `data`. The recordings of an input that was merged before are already named.
+std::vector<std::string> warnings_of(const MergeResult& merged, std::string MergedInput::*name);
 
 // The global bundle adjustment that follows. After a stop request, it ends early.
 void adjust_merged(map::BundledMap& map, const system::Config& config, const std::stop_token& interrupted = {});

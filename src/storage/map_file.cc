@@ -200,6 +200,11 @@ Result<SavedMap> map_from_bytes(std::string_view bytes, std::string file) {
   return map_in(*copy, file, copy);
 }
 
+std::string joined_warnings(const std::string& stored, const std::string& of_run) {
+  if (stored.empty() || stored.find(of_run) != std::string::npos) return stored.empty() ? of_run : stored;
+  return stored + "; " + of_run;
+}
+
 Status write_map(const map::BundledMap& map, const MapFileInfo& info, const std::filesystem::path& file) {
   if (map.rig().size() > kMaxCameras) {
     return Error{file.string(), "rig", std::to_string(map.rig().size()) + " cameras",

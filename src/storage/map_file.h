@@ -25,6 +25,9 @@ struct MapFileInfo {
   std::string warning = {};
 };
 
+// The warning of a map that a run has continued: the one stored in it and that of the run, if it is another one.
+std::string joined_warnings(const std::string& stored, const std::string& of_run);
+
 struct SavedMap {
   std::string file;
   map::BundledMap map;

@@ -47,7 +47,7 @@ std::optional<camera::RigCamera> take_rig_camera(SectionReader& in) {
   camera::CameraDescription d = take_description(in);
   const SE3 T_body_cam = take_transform(in);
   const auto offset_ns = in.number<TimeNs>();
-  d.mask_file = in.text();
+  in.text();  // the path of a mask, in maps of older versions
   if (!in.ok()) return {};
   const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> rows = T_body_cam.matrix();
   d.T_body_cam.assign(rows.data(), rows.data() + rows.size());
@@ -129,7 +129,7 @@ void put_cameras(const camera::Rig& rig, ByteWriter& out) {
     out.numbers(distortion.data(), distortion.size());
     put_transform(rig.body_from_cam(i), out);
     out.number(c.time_offset_ns);
-    out.text(c.mask_file);
+    out.text("");  // a mask belongs to the recording, and its path to one machine
   }
   const auto readouts = readouts_of(rig);
   out.numbers(readouts.data(), readouts.size());

@@ -115,17 +115,27 @@ TEST(MergeMaps, SaysWhichMapsDisagreeAboutTheScale) {
 }
 
 TEST(MergeMaps, KeepsTheWarningsOfAllMapsAndScales) {
-  EXPECT_TRUE(warnings_of(merged_runs()).empty());
+  EXPECT_TRUE(warnings_of(merged_runs(), &MergedInput::file).empty());
   std::vector<SavedMap> maps = {runs()[0], scaled(runs()[1], 1.03), runs()[2]};
   maps[0].info.warning = "one reason";
   maps[2].info.warning = "another reason";
   const auto result = merged(maps);
   ASSERT_TRUE(result) << result.error().message();
-  const std::vector<std::string> warnings = warnings_of(*result);
+  const std::vector<std::string> warnings = warnings_of(*result, &MergedInput::file);
   ASSERT_EQ(warnings.size(), 4u);
   EXPECT_EQ(warnings[0], "a.bmap: one reason");
   EXPECT_EQ(warnings[1], "c.bmap: another reason");
   for (const std::size_t i : {2, 3}) EXPECT_TRUE(warnings[i].starts_with("the scales of b.bmap and ")) << warnings[i];
+  // What is stored names recordings, since files may be temporary, and names them once.
+  const std::vector<std::string> stored = warnings_of(*result, &MergedInput::data);
+  EXPECT_EQ(stored[0], "a: one reason");
+  EXPECT_TRUE(stored[2].starts_with("the scales of b and ")) << stored[2];
+  SavedMap site = saved(result->map, "a + c");
+  site.info.warning = stored[0] + "; " + stored[1];
+  MergeResult again = *result;
+  again.scales.clear();
+  again.inputs = {{.file = "site.bmap", .data = site.info.data, .warning = site.info.warning}};
+  EXPECT_EQ(warnings_of(again, &MergedInput::file), std::vector<std::string>{"a: one reason; c: another reason"});
 }
 
 TEST(MergeMaps, RejectsTheSameMapTwice) {
