@@ -5,6 +5,9 @@ import functools
 import io
 import os
 import pathlib
+import shutil
+import subprocess
+import sys
 
 import bslam
 import fsspec
@@ -16,6 +19,7 @@ from bslam.fleet import _files, _tasks
 from bslam.fleet._cache import cached, content_of
 from fsspec import AbstractFileSystem
 from fsspec.registry import _registry
+from test_fleet_requests import masked_rig
 
 
 class Store(AbstractFileSystem):
@@ -27,10 +31,10 @@ class Store(AbstractFileSystem):
     header: dict = {}
     content = b"the content"
 
-    def find(self, path, *_, **__):
+    def find(self, path, *_, detail=False, **__):
         if self.listing_error:
             raise self.listing_error
-        return [path]
+        return {path: {}} if detail else [path]
 
     def info(self, path, **_):
         return {"name": path, "type": "file", "size": len(self.content), **self.header}
@@ -140,6 +144,77 @@ def test_file_of_a_web_server_that_sends_no_header_is_read(store, tmp_path):
     assert content() != before
 
 
+def test_copies_of_the_files_of_options_are_on_the_disk_before_they_have_their_name(tmp_path, monkeypatch):
+    flushed, named = set(), []
+    flush, replace = os.fsync, pathlib.Path.replace
+
+    def note_flush(descriptor):
+        flushed.add(os.fstat(descriptor).st_ino)
+        flush(descriptor)
+
+    def note_name(path, target):
+        named.append((pathlib.Path(target).suffix, path.stat().st_ino in flushed))
+        return replace(path, target)
+
+    rig = masked_rig(tmp_path / "given", 0)
+    monkeypatch.setattr(os, "fsync", note_flush)
+    monkeypatch.setattr(pathlib.Path, "replace", note_name)
+    _files.shared_rig(tmp_path / "cache", rig)
+    assert named == [(".png", True), (".yaml", True)]
+
+
+@pytest.mark.parametrize("damaged", [".png", ".yaml"])
+def test_damaged_copies_of_the_files_of_options_are_written_again(tmp_path, damaged):
+    rig = masked_rig(tmp_path / "given", 0)
+    shared = _files.shared_rig(tmp_path / "cache", rig)
+    (copy,) = shared.parent.glob(f"*{damaged}")
+    before = copy.read_bytes()
+    copy.write_bytes(before[:10])
+    assert _files.shared_rig(tmp_path / "cache", rig) == shared
+    assert copy.read_bytes() == before
+
+
+def test_copy_that_differs_from_its_file_is_refused(tmp_path, monkeypatch):
+    (tmp_path / "settings.yaml").write_text("features: {per_image: 800}")
+    monkeypatch.setattr(shutil, "copyfile", lambda _, copy: pathlib.Path(copy).write_text("features:"))
+    with pytest.raises(bslam.Error, match="the copy differs from .*settings.yaml; the same command continues"):
+        _files.options(tmp_path / "cache", None, tmp_path / "settings.yaml", [])
+
+
+def hash_of_the_installation(folder):
+    """What a new process with the package in this folder finds."""
+    command = [sys.executable, "-c", "from bslam.fleet import _tasks; print(_tasks.program_hash())"]
+    environment = {**os.environ, "PYTHONPATH": str(folder)}
+    return subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
+
+
+def test_other_compiled_module_is_another_version(tmp_path):
+    (copy := tmp_path / "bslam").mkdir()
+    for path in pathlib.Path(bslam.__file__).parent.iterdir():
+        if path.name != "__pycache__":
+            (copy / path.name).symlink_to(path.absolute())
+    module = copy / pathlib.Path(bslam._bslam.__file__).name
+    before = hash_of_the_installation(tmp_path)
+    content = module.read_bytes()
+    module.unlink()
+    module.write_bytes(content)
+    assert hash_of_the_installation(tmp_path) == before
+    module.write_bytes(content + b"other")
+    assert hash_of_the_installation(tmp_path) != before
+
+
+def test_program_that_is_replaced_is_another_version(tmp_path, monkeypatch):
+    program = tmp_path / "bslam"
+    program.write_text("old")
+    monkeypatch.setattr(_tasks, "PROGRAM", program)
+    setup = _tasks.Setup(str(tmp_path), _tasks.program_hash())
+    setup.check()
+    (tmp_path / "new").write_text("new")
+    (tmp_path / "new").replace(program)
+    with pytest.raises(bslam.Error, match="found another version of bslam"):
+        setup.check()
+
+
 def test_files_that_are_written_at_once_are_whole(tmp_path):
     """Two commands that write the same file do not share an unfinished one."""
     file = tmp_path / "rig.yaml"
@@ -172,3 +247,14 @@ def test_folder_with_a_cache_and_other_files_is_not_replaced(tmp_path):
     with pytest.raises(bslam.Error, match="--out: found a folder that is not empty"):
         _files.open_results(tmp_path, False)
     assert _files.open_results(tmp_path, True) == set()
+
+
+@pytest.mark.parametrize("cache", ["work", "work/of/fleet"])
+def test_folder_with_a_cache_of_another_name_is_that_of_an_interrupted_command(tmp_path, cache):
+    (tmp_path / cache / "maps").mkdir(parents=True)
+    with pytest.raises(bslam.Error, match="--out: found a folder that is not empty"):
+        _files.open_results(tmp_path, False, tmp_path / "elsewhere")
+    assert _files.open_results(tmp_path, False, tmp_path / cache) == set()
+    (tmp_path / "notes.txt").write_text("mine")
+    with pytest.raises(bslam.Error, match="--out: found a folder that is not empty"):
+        _files.open_results(tmp_path, False, tmp_path / cache)

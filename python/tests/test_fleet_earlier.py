@@ -216,6 +216,34 @@ def test_copies_of_a_recording_are_no_further_recordings(client, monday, tmp_pat
         assert (site.folder / r.map).exists() and (site.folder / r.trajectory).exists()
 
 
+def test_command_with_its_cache_in_the_folder_of_results_continues(client, monday, tmp_path, replaced_run):
+    replaced_run()
+    (tmp_path / "site/work/maps").mkdir(parents=True)
+    site = map_recordings([monday], tmp_path / "site", client=client, cache=tmp_path / "site/work")
+    assert [r.state for r in site.recordings] == ["apart"]
+
+
+def test_copies_of_a_recording_have_maps_with_their_own_names(client, monday, tmp_path, replaced_run):
+    """The program writes the name of a recording into its map."""
+
+    def run(*arguments):
+        done = run_of_nothing(*arguments)
+        pathlib.Path(arguments[3].removeprefix("--save-map=")).write_text(f"a map of {pathlib.Path(arguments[1]).name}")
+        return done
+
+    replaced_run(run)
+    names = ["monday", "monday_copy"]
+    shutil.copytree(monday, tmp_path / "monday_copy")
+    for number, order in enumerate((names, names[::-1])):  # whichever is first in the cache
+        for name in order:
+            out, cache = tmp_path / f"{number}_{name}", tmp_path / f"{number}"
+            site = map_recordings([tmp_path / name], out, client=client, cache=cache)
+            assert (site.folder / site.recordings[0].map).read_text() == f"a map of {name}"
+    site = map_recordings([tmp_path / name for name in names], tmp_path / "both", client=client, cache=tmp_path / "0")
+    assert [r.reason for r in site.recordings[1:]] == ["it has the content of monday"]
+    assert [(site.folder / r.map).read_text() for r in site.recordings] == [f"a map of {name}" for name in names]
+
+
 def test_folder_that_cannot_be_written_is_refused_at_once(monday, tmp_path, monkeypatch):
     (tmp_path / "site").mkdir()
     opened = os.open

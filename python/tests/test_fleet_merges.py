@@ -69,6 +69,7 @@ def merge(client, tmp_path, monkeypatch):
             np.save(folder / "sketch.npy", np.full((1 + number, 64), 7, np.uint32))
             made[name] = {
                 "map": sha256_of(folder / "map.bmap"),
+                "content": name,
                 "folder": str(folder),
                 "scale": "metric",
                 "keyframes": 1,
@@ -193,12 +194,12 @@ def test_warnings_of_runs_name_the_recording(tmp_path, monkeypatch):
     monkeypatch.setattr(_tasks, "_run", program)
     monkeypatch.setattr(_tasks._bslam, "Map", EmptyMap)
     setup = _tasks.Setup(str(tmp_path / "cache"), _tasks.program_hash())
-    for name in ("first", "copy"):
-        (tmp_path / name).mkdir()
-        (tmp_path / name / "image.png").write_text("the same")
-        made = _tasks.make_map(setup, str(tmp_path / name))
-        assert made["computed"] == (name == "first")
-        assert made["warnings"] == ["images are missing", f"test it (bslam rig info --images {tmp_path / name})"]
+    for folder in (tmp_path / "first/monday", tmp_path / "copy/monday"):
+        folder.mkdir(parents=True)
+        (folder / "image.png").write_text("the same")
+        made = _tasks.make_map(setup, str(folder))
+        assert made["computed"] == (folder.parent.name == "first")
+        assert made["warnings"] == ["images are missing", f"test it (bslam rig info --images {folder})"]
 
 
 def test_call_after_a_repair_does_not_get_the_error_before_it(client, tmp_path, monkeypatch):

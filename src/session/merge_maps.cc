@@ -192,8 +192,9 @@ std::vector<std::string> warnings_of(const MergeResult& merged, std::string Merg
   std::vector<std::string> out;
   for (const MergedInput& input : merged.inputs) {
     if (input.warning.empty()) continue;
-    const bool named = input.data.find(kBetweenRecordings) != std::string::npos;  // each warning names its recording
-    out.push_back(named ? input.warning : input.*name + ": " + input.warning);
+    const bool of_several = input.data.find(kBetweenRecordings) != std::string::npos;
+    const bool names_itself = of_several && name == &MergedInput::data;
+    out.push_back(names_itself ? input.warning : input.*name + ": " + input.warning);
   }
   for (const ScaleComparison& c : merged.scales) {
     if (!c.disagrees()) continue;

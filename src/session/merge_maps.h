@@ -48,7 +48,7 @@ inline constexpr std::string_view kBetweenRecordings = " + ";
 
 // Reasons why the poses of the merged map cannot be relied on: those of the inputs, and scales that disagree. The maps
 // are not scaled: metric maps whose scales differ contain a wrong calibration. `name`: how inputs are named, by `file`
-// or, in what is stored, by `data`. The recordings of an input that was merged before are already named.
+// or, in what is stored, by `data`; the warnings of an input that was merged before name its recordings already.
 std::vector<std::string> warnings_of(const MergeResult& merged, std::string MergedInput::*name);
 
 // The global bundle adjustment that follows. After a stop request, it ends early.

@@ -135,7 +135,7 @@ TEST(MergeMaps, KeepsTheWarningsOfAllMapsAndScales) {
   MergeResult again = *result;
   again.scales.clear();
   again.inputs = {{.file = "site.bmap", .data = site.info.data, .warning = site.info.warning}};
-  EXPECT_EQ(warnings_of(again, &MergedInput::file), std::vector<std::string>{"a: one reason; c: another reason"});
+  EXPECT_EQ(warnings_of(again, &MergedInput::data), std::vector<std::string>{"a: one reason; c: another reason"});
 }
 
 TEST(MergeMaps, RejectsTheSameMapTwice) {

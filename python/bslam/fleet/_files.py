@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import pathlib
@@ -13,8 +14,8 @@ from typing import Any, Union
 
 from .. import _bslam
 from . import _interruption
-from ._cache import sha256_of
-from ._tasks import refusal, run_program
+from ._cache import Result, sha256_of
+from ._tasks import check_map, map_of, refusal, run_program
 
 Path = Union[str, "os.PathLike[str]"]
 
@@ -86,17 +87,31 @@ def _shared(cache: pathlib.Path, file: Path) -> pathlib.Path:
     except OSError as error:
         raise _bslam.Error(f"cannot open {file}: {error.strerror}") from error
     shared = cache / "files" / f"{digest}{pathlib.Path(file).suffix}"
-    if not shared.exists():
+    if not _has_content(shared, digest):
         copy(file, shared)
+        if not _has_content(shared, digest):
+            raise _bslam.Error(f"cannot write {shared}: the copy differs from {file}; the same command continues")
     return shared
 
 
-def open_results(out: pathlib.Path, overwrite: bool) -> set[str]:
-    """Creates the folder of the results and returns the files of an earlier result in it, relative to the folder."""
+def _has_content(file: pathlib.Path, digest: str) -> bool:
+    try:
+        return sha256_of(file) == digest
+    except OSError:
+        return False
+
+
+def open_results(out: pathlib.Path, overwrite: bool, cache: pathlib.Path | None = None) -> set[str]:
+    """Creates the folder of the results and returns the files of an earlier result in it, relative to the folder.
+
+    `cache` is the folder of the intermediate results, which may be in it.
+    """
     make_folder(out, "--out")
     _check_writable(out)
     there = set(os.listdir(out))
-    if "site.json" not in there and there - {"cache"} and not overwrite:
+    path_of_cache = os.path.relpath(os.path.realpath(cache or out / "cache"), os.path.realpath(out))
+    others = there - {"cache", path_of_cache.partition("/")[0]}
+    if "site.json" not in there and others and not overwrite:
         raise _bslam.Error(
             f"{out}: --out: found a folder that is not empty, expected an empty or new folder, or --overwrite"
         )
@@ -147,18 +162,22 @@ def _check_writable(out: pathlib.Path) -> None:
 
 
 def replace_results(
-    out: pathlib.Path, files: Mapping[str, pathlib.Path], summary: dict[str, Any], earlier: set[str]
+    out: pathlib.Path,
+    files: Mapping[str, tuple[Callable[[Any, pathlib.Path], None], Any]],
+    summary: dict[str, Any],
+    earlier: set[str],
 ) -> None:
-    """Writes copies of `files`, by their names in the folder, and the summary, in place of the `earlier` files.
+    """Writes `files`, by their names in the folder, and the summary, in place of the `earlier` files.
 
+    Each is given by the function that copies it, such as `copy`, and its source.
     No file is replaced before all are complete, so that the earlier result remains if the disk is full.
     """
     if not (out / "site.json").exists():
         _write_json(out / "site.json", {"schema": 1, "sites": [], "recordings": [], "warnings": []})  # to know it again
     try:
         with tempfile.TemporaryDirectory(prefix=".", dir=out, ignore_cleanup_errors=True) as work:
-            for name, source in files.items():
-                copy(source, pathlib.Path(work, name))
+            for name, (copy_file, source) in files.items():
+                copy_file(source, pathlib.Path(work, name))
             _write_json(pathlib.Path(work, "site.json"), summary)
             for name in (*files, "site.json"):
                 (out / name).parent.mkdir(exist_ok=True)
@@ -178,13 +197,26 @@ def copy(source: Path, file: pathlib.Path) -> None:
     write(file, lambda unfinished: shutil.copyfile(source, unfinished))
 
 
+def copy_map(result: Result, file: pathlib.Path) -> None:
+    """Copies a map of the cache. Raises DamagedError if it is not the one that was written."""
+
+    def make(unfinished: pathlib.Path) -> None:
+        with contextlib.suppress(FileNotFoundError):
+            shutil.copyfile(map_of(result), unfinished)
+        check_map(result, unfinished)
+
+    write(file, make)
+
+
 def write(file: pathlib.Path, make: Callable[[pathlib.Path], Any]) -> None:
-    """Writes a file by `make`, under its name when it is complete."""
+    """Writes a file by `make`, under its name when it is complete and on the disk."""
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".", dir=file.parent, ignore_cleanup_errors=True) as work:
             unfinished = pathlib.Path(work, file.name)
             make(unfinished)
+            with unfinished.open("rb") as written:
+                os.fsync(written.fileno())
             unfinished.replace(file)
     except OSError as error:
         raise _bslam.Error(f"cannot write {file}: {error.strerror}; the same command continues") from error

@@ -9,7 +9,7 @@ import pathlib
 import re
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -127,8 +127,8 @@ def map_recordings(
     named = _named(recordings)
     _files.check_settings(config, settings)
     out = pathlib.Path(out).absolute()
-    earlier = _files.open_results(out, overwrite)
     folder = pathlib.Path(cache or out / "cache").absolute()
+    earlier = _files.open_results(out, overwrite, folder)
     _files.make_folder(folder, "--cache")
     run, common, copies = _files.options(folder, rig, config, settings)
     if rig is not None:
@@ -178,7 +178,7 @@ class _Mapping:
         self.earlier = earlier  # files of the result that this one replaces
         self.copies = copies  # by file in the cache: the file of the user
         self.site = Site(out)
-        self.files: dict[str, pathlib.Path] = {}  # by name of a file of the result: the file in the cache
+        self.files: dict[str, tuple[Callable[..., None], Any]] = {}  # by name in the result: what copies it, its source
         self.verdicts: dict[tuple[str, str], bool] = {}  # whether the maps of a pair share a place
         self.reasons: dict[str, str] = {}  # by hash of a map: why it shares no place with another map
         self.refused: list[frozenset[str]] = []  # hashes of maps that cannot be in one map
@@ -188,17 +188,18 @@ class _Mapping:
         self.site.recordings = recordings
         made = self._done("maps", [self._submit(_tasks.make_map, r.data) for r in recordings])
         found: dict[str, tuple[Recording, Result]] = {}  # by hash of the map
+        maps: dict[str, str] = {}  # by hash of the content: that of the first map
         again: list[tuple[Result, list[tuple[Recording, Result]]]] = []  # recordings with a map that is found already
         for recording, result in zip(recordings, made, strict=True):
             warnings = map(self._as_given, result.get("warnings", []))
             self.site.warnings += [f"{recording.name}: {warning}" for warning in warnings]
             if "error" in result:
                 recording.state, recording.reason = "failed", self._as_given(result["error"])
-            elif result["map"] in found:
-                self._note_copy(recording, found[result["map"]][0])
+            elif (key := maps.setdefault(result["content"], result["map"])) in found:
+                self._note_copy(recording, found[key][0])
                 again.append((result, [(recording, result)]))
             else:
-                found[result["map"]] = (recording, result)
+                found[key] = (recording, result)
         if not found and self.earlier:
             self.site.warnings.append(f"every recording failed; the earlier result in {self.site.folder} is kept")
             return self.site
@@ -338,7 +339,7 @@ class _Mapping:
                 else:
                     r.reason = r.reason or self._reason(own["map"], len(members) > 1)
                     r.map, source = f"apart/{r.name}.bmap", own
-                    self.files[r.map] = pathlib.Path(own["folder"], "map.bmap")
+                    self.files[r.map] = (_files.copy_map, own)
                 self._add_trajectories(r, source)
         _files.replace_results(self.site.folder, self.files, self._summary(), self.earlier)
 
@@ -348,12 +349,12 @@ class _Mapping:
         files.update({part: f"apart/{recording.name}{part.removeprefix('trajectory')}" for part in source["parts"]})
         recording.parts = [files[part] for part in source["parts"]]
         for name, file in files.items():
-            self.files[file] = pathlib.Path(source["folder"], name)
+            self.files[file] = (_files.copy, pathlib.Path(source["folder"], name))
 
     def _add_site(self, merged: Result, names: list[str]) -> None:
         number = len(self.site.sites) + 1
         file = "site.bmap" if number == 1 else f"site_{number}.bmap"
-        self.files[file] = pathlib.Path(merged["folder"], "map.bmap")
+        self.files[file] = (_files.copy_map, merged)
         self.site.sites.append({"map": file, "recordings": sorted(names), **{n: merged[n] for n in _NUMBERS}})
 
     def _reason(self, key: str, verified: bool) -> str:

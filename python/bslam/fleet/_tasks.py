@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import errno
 import functools
@@ -11,19 +12,33 @@ import pathlib
 import shutil
 import signal
 import subprocess
-import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from .. import _bslam
 from .._program import PROGRAM
-from ._cache import Result, UnreadableError, cached, content_of, key_of, local_copy, reason_of, sha256_of
+from ._cache import (
+    FILES_ABOVE,
+    Result,
+    UnreadableError,
+    cached,
+    content_of,
+    discard,
+    key_of,
+    local_copy,
+    name_of,
+    reason_of,
+    sha256_of,
+    work_folder,
+)
 from ._sketch import sketch
 
 _NOTHING_TRACKED, _WRONG_INPUT = 3, 2  # exit status
 _CANNOT_WRITE = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)  # errors that reading never has
+_PACKAGE = (pathlib.Path(_bslam.__file__), *sorted(pathlib.Path(__file__).parent.glob("*.py")))
+_LOADED = key_of([sha256_of(file) for file in _PACKAGE])  # what this process runs, also if the files are replaced
 
 
 class ProgramKilledError(RuntimeError):
@@ -36,6 +51,10 @@ class RefusedError(_bslam.Error):
 
 class NotWrittenError(_bslam.Error):
     """The program could not write a file, for example because the disk is full: no fault of its input."""
+
+
+class DamagedError(_bslam.Error):
+    """A map in the cache was not what the program wrote. It is deleted, so that the same command makes it again."""
 
 
 @dataclass(frozen=True)
@@ -56,65 +75,75 @@ class Setup:
             )
 
 
-@functools.lru_cache
 def program_hash() -> str:
-    """Hash of the program of this installation, and of this package."""
-    return key_of([sha256_of(f) for f in (PROGRAM, *sorted(pathlib.Path(__file__).parent.glob("*.py")))])
+    """Hash of the program of this installation, which may be replaced at any time, and of the package in use."""
+    status = PROGRAM.stat()
+    return key_of([_hash_of_version(PROGRAM, status.st_size, status.st_mtime_ns), _LOADED])
+
+
+@functools.lru_cache(maxsize=1)
+def _hash_of_version(file: pathlib.Path, *_: int) -> str:
+    return sha256_of(file)
 
 
 def make_map(setup: Setup, recording: str) -> Result:
     """The map of a recording, with its hash as `map`, its trajectories and its sketch; or the `error`.
 
-    `parts` are the files of the trajectories in further submaps, and `warnings` those of the run.
+    `parts` are the files of the trajectories in further submaps, `warnings` those of the run, and `content` is the hash
+    of the recording. The map contains the name of the recording, so that it depends on it.
     """
     setup.check()
     try:
         content = content_of(setup.cache, recording)
     except UnreadableError as error:
         return {"error": str(error), "computed": False}
-
-    def make(folder: pathlib.Path) -> Result:
-        with tempfile.TemporaryDirectory() as work:
-            data, run = _fetched(recording, pathlib.Path(work)), pathlib.Path(work, "run")
-            # The same for all recordings with this content.
-            neutral = functools.partial(_replaced, {f"{data}: ": "", data: content, f"{run}/": ""})
-            done = _run(
-                "run",
-                data,
-                f"--out={run}",
-                f"--save-map={folder}/map.bmap",
-                "--mode=sequential",
-                "--set=execution.threads=1",
-                "--no-report",
-                "--progress=never",
-                *setup.run,
-                *setup.settings,
-            )
-            if done.returncode == _NOTHING_TRACKED:
-                return {"error": "no frame could be tracked", "warnings": [*map(neutral, _warnings(done))]}
-            if done.returncode != 0:
-                raise _error_of(done)
-            parts = sorted((f.name for f in run.glob("trajectory_part*.tum")), key=lambda name: (len(name), name))
-            for name in ("trajectory.tum", *parts, "summary.json"):
-                shutil.copy(run / name, folder)
-        made = _bslam.Map.load(folder / "map.bmap")
-        np.save(folder / "sketch.npy", sketch(made.words()))
-        return {
-            "map": sha256_of(folder / "map.bmap"),
-            "keyframes": made.num_keyframes,
-            "landmarks": made.num_landmarks,
-            "scale": made.scale,
-            "parts": parts,
-            "warnings": [*map(neutral, _warnings(done))],
-        }
-
+    depends_on = [setup.program, setup.run, setup.settings, content, name_of(recording)]
     try:
-        result = cached(setup.cache, "maps", [setup.program, setup.run, setup.settings, content], make)
+        result = cached(setup.cache, "maps", depends_on, functools.partial(_run_on, recording, content, setup))
     except NotWrittenError:
         raise
     except _bslam.Error as error:
         return {"error": str(error), "computed": True}
-    return {**result, "warnings": [w.replace(content, recording) for w in result["warnings"]]}
+    warnings = [w.replace(content, recording) for w in result["warnings"]]
+    return {**result, "content": content, "warnings": warnings}
+
+
+def _run_on(recording: str, content: str, setup: Setup, folder: pathlib.Path) -> Result:
+    """Writes the map of a recording and its trajectories. Texts name the recording by the hash of its content."""
+    with work_folder() as work:
+        data, run = _fetched(recording, work / "data"), work / "run"
+        done = _run(
+            "run",
+            data,
+            f"--out={run}",
+            f"--save-map={folder}/map.bmap",
+            "--mode=sequential",
+            "--set=execution.threads=1",
+            "--no-report",
+            "--progress=never",
+            *setup.run,
+            *setup.settings,
+        )
+        above = {f"{os.path.dirname(data)}/{name}": f"{content}/../{name}" for name in FILES_ABOVE}
+        names = {f"{data}: ": "", data: content, **above, f"{run}/": ""}
+        warnings = [_replaced(names, warning) for warning in _warnings(done)]
+        if done.returncode == _NOTHING_TRACKED:
+            return {"error": "no frame could be tracked", "warnings": warnings}
+        if done.returncode != 0:
+            raise _error_of(done)
+        parts = sorted((f.name for f in run.glob("trajectory_part*.tum")), key=lambda name: (len(name), name))
+        for name in ("trajectory.tum", *parts, "summary.json"):
+            shutil.copy(run / name, folder)
+    made = _bslam.Map.load(folder / "map.bmap")
+    np.save(folder / "sketch.npy", sketch(made.words()))
+    return {
+        "map": sha256_of(folder / "map.bmap"),
+        "keyframes": made.num_keyframes,
+        "landmarks": made.num_landmarks,
+        "scale": made.scale,
+        "parts": parts,
+        "warnings": warnings,
+    }
 
 
 def _fetched(recording: str, folder: pathlib.Path) -> str:
@@ -135,7 +164,9 @@ def compare(setup: Setup, a: Result, b: Result) -> Result:
     setup.check()
 
     def make(_: pathlib.Path) -> Result:
-        verdict = json.loads(run_program("map", "merge", *map(_map_of, (a, b)), "--dry-run", "--json", *setup.settings))
+        with _intact(a, b):
+            files = map(map_of, (a, b))
+            verdict = json.loads(run_program("map", "merge", *files, "--dry-run", "--json", *setup.settings))
         reason = next((i["reason"] for i in verdict["inputs"] if not i["joined"]), "")
         return {"joined": not reason, "reason": reason}
 
@@ -157,9 +188,10 @@ def merge(setup: Setup, maps: list[Result], final: bool = False) -> Result:
 
     def make(folder: pathlib.Path) -> Result:
         options = ["--json", f"--out={folder}/map.bmap", *setup.settings, *([] if final else ["--no-final-ba"])]
-        done = _checked("map", "merge", *map(_map_of, maps), *options)
+        with _intact(*maps):
+            done = _checked("map", "merge", *map(map_of, maps), *options)
         merged = json.loads(done.stdout)
-        of_inputs = tuple(f"{_map_of(m)}: " for m in maps)
+        of_inputs = tuple(f"{map_of(m)}: " for m in maps)
         warnings = [_by_hash(w, maps) for w in _warnings(done) if not w.startswith(of_inputs)]
         numbers = {name: merged[name] for name in ("keyframes", "landmarks", "submaps")}
         return {"map": sha256_of(folder / "map.bmap"), **numbers, "warnings": warnings}
@@ -181,7 +213,8 @@ def transfer(setup: Setup, own: Result, site: Result) -> Result:
     setup.check()
 
     def make(folder: pathlib.Path) -> Result:
-        joined = _move("trajectory.tum", own, site, folder)
+        with _intact(own, site):
+            joined = _move("trajectory.tum", own, site, folder)
         added = [name for name in own["parts"] if _move_part(name, own, site, folder)]
         if joined:
             _add_poses(folder / "trajectory.tum", [folder / name for name in added])
@@ -193,7 +226,7 @@ def transfer(setup: Setup, own: Result, site: Result) -> Result:
 def _move(name: str, own: Result, site: Result, folder: pathlib.Path) -> bool:
     """Writes a trajectory of a recording in the map of a site. Returns whether it is in the first submap."""
     given, file = pathlib.Path(own["folder"], name), folder / name
-    run_program("map", "transfer", str(given), f"--from={_map_of(own)}", f"--to={_map_of(site)}", f"--out={file}")
+    run_program("map", "transfer", str(given), f"--from={map_of(own)}", f"--to={map_of(site)}", f"--out={file}")
     with file.open() as lines:
         return " parent=world " in lines.readline()
 
@@ -216,13 +249,36 @@ def _add_poses(trajectory: pathlib.Path, parts: Sequence[pathlib.Path]) -> None:
     trajectory.write_text("\n".join([*comments, *poses]) + "\n")
 
 
-def _map_of(result: Result) -> str:
+def map_of(result: Result) -> str:
+    """The file of a map in the cache."""
     return str(pathlib.Path(result["folder"], "map.bmap"))
+
+
+def check_map(result: Result, file: str | os.PathLike[str]) -> None:
+    """Deletes a result and raises DamagedError unless `file`, its map or a copy of it, has the hash of its map."""
+    with contextlib.suppress(FileNotFoundError):
+        if sha256_of(file) == result["map"]:
+            return
+    discard(result)
+    raise DamagedError(
+        f"{map_of(result)}: found a damaged map, expected the one that was written; the same command makes it again"
+    )
+
+
+@contextlib.contextmanager
+def _intact(*maps: Result) -> Iterator[None]:
+    """If the program fails on maps of the cache, and one of them is damaged, this is the error."""
+    try:
+        yield
+    except _bslam.Error:
+        for result in maps:
+            check_map(result, map_of(result))
+        raise
 
 
 def _by_hash(text: str, maps: Sequence[Result]) -> str:
     """The text with hashes of maps instead of their files."""
-    return _replaced({_map_of(m): m["map"] for m in maps}, text)
+    return _replaced({map_of(m): m["map"] for m in maps}, text)
 
 
 def _replaced(names: Mapping[str, str], text: str) -> str:
