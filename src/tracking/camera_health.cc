@@ -96,13 +96,14 @@ std::optional<bool> is_blurred(const image::ImageView& image, const HealthOption
 ImageHealth image_health(const image::ImageView& image, const HealthOptions& options) {
   ImageHealth out{.content = content(image), .blurred = is_blurred(image, options)};
   measure_exposure(image, options, out);
+  out.blocks = block_means(image);
   return out;
 }
 
 }  // namespace
 
 CameraMonitor::CameraMonitor(std::size_t cameras, const HealthOptions& options)
-    : options_(options), cameras_(cameras) {}
+    : options_(options), cameras_(cameras), still_views_(cameras) {}
 
 ImageFaults CameraMonitor::examine(const image::ImageBundle& images, ThreadPool& pool) {
   BSLAM_ASSERT(images.images.size() == cameras_.size(), "there must be one image entry per camera");
@@ -112,7 +113,7 @@ ImageFaults CameraMonitor::examine(const image::ImageBundle& images, ThreadPool&
     if (input.state == image::ImageState::kPresent) health[c] = image_health(input.view(), options_);
   });
   ImageFaults faults;
-  faults.outage = find_outages(health, faults.repeated);
+  faults.outage = find_outages(health, images.time_ns, faults.repeated);
   faults.blurred = find_blurred(health);
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
     const CameraReason outage = faults.outage[c];
@@ -127,8 +128,9 @@ ImageFaults CameraMonitor::examine(const image::ImageBundle& images, ThreadPool&
   return faults;
 }
 
-std::vector<CameraReason> CameraMonitor::find_outages(const Health& images, bool& repeated) {
+std::vector<CameraReason> CameraMonitor::find_outages(const Health& images, TimeNs time_ns, bool& repeated) {
   std::vector<CameraReason> found(cameras_.size(), CameraReason::kNoImages);
+  const std::vector<std::uint8_t> still = find_still(images, time_ns);
   std::vector<std::uint8_t> same(cameras_.size(), 0);
   bool any_changed = false;
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
@@ -141,8 +143,9 @@ std::vector<CameraReason> CameraMonitor::find_outages(const Health& images, bool
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
     Camera& camera = cameras_[c];
     if (found[c] == CameraReason::kNoImages) continue;
+    same[c] |= still[c];
     // A frozen camera stays frozen as long as its image is the same, even if no other camera has an image.
-    const bool frozen = same[c] && (any_changed || camera.outage == CameraReason::kFrozen);
+    const bool frozen = same[c] && (still[c] || any_changed || camera.outage == CameraReason::kFrozen);
     if (found[c] == CameraReason::kNone && frozen) found[c] = CameraReason::kFrozen;
     if (camera.outage == CameraReason::kFrozen && !same[c] && camera.repeated <= kMaxRepeated)
       camera.outage = CameraReason::kNone;
@@ -166,6 +169,14 @@ std::vector<CameraReason> CameraMonitor::find_outages(const Health& images, bool
   }
   repeated = any && !any_new;
   return found;
+}
+
+std::vector<std::uint8_t> CameraMonitor::find_still(const Health& images, TimeNs time_ns) {
+  std::vector<std::optional<BlockMeans>> blocks(cameras_.size());
+  for (std::size_t c = 0; c < cameras_.size(); ++c) {
+    if (images[c] && images[c]->reason == CameraReason::kNone) blocks[c] = images[c]->blocks;
+  }
+  return still_views_.update(blocks, time_ns);
 }
 
 void CameraMonitor::admit_if_none_is_left(const Health& images, std::vector<CameraReason>& found) {

@@ -9,6 +9,7 @@
 #include "base/thread_pool.h"
 #include "image/image_bundle.h"
 #include "tracking/camera_status.h"
+#include "tracking/still_views.h"
 
 namespace bslam::tracking {
 
@@ -48,6 +49,7 @@ struct ImageHealth {
   bool shows_something = true;                // some pixels are neither dark nor bright
   std::uint64_t content = 0;                  // hash of all pixels
   std::optional<bool> blurred;                // nullopt: there are too few edges
+  BlockMeans blocks = {};
 };
 
 // Faults found in the images of a frame; one entry per camera.
@@ -69,12 +71,13 @@ class CameraMonitor {
   using Health = std::vector<std::optional<ImageHealth>>;  // per camera; nullopt: it has no image
 
   // Per camera, why it is not used in this frame. An image is frozen if it is identical to the previous image of its
-  // camera while the image of another camera has changed. If all images are identical, the rig may be at rest: see
-  // ImageFaults::repeated and Tracker::note_repetition. After a few identical images, as of a driver that repeats the
-  // images of a slow camera, the next one is used at once. A camera without an image is not used in that frame, and
-  // used again with its next image. If all other cameras are out as well, a camera with a good image is used
-  // immediately. If no image is good, the cameras whose images are only partly over-exposed are used.
-  std::vector<CameraReason> find_outages(const Health& images, bool& repeated);
+  // camera while the image of another camera has changed, or a still picture (still_views.h). If all images are
+  // identical, the rig may be at rest: see ImageFaults::repeated and Tracker::note_repetition. After a few identical
+  // images, as of a driver that repeats the images of a slow camera, the next one is used at once. A camera without an
+  // image is not used in that frame, and used again with its next image. If all other cameras are out as well, a camera
+  // with a good image is used immediately. If no image is good, the cameras whose images are only partly over-exposed
+  // are used.
+  std::vector<CameraReason> find_outages(const Health& images, TimeNs time_ns, bool& repeated);
   void admit_if_none_is_left(const Health& images, std::vector<CameraReason>& found);
   // Per camera: whether it is out of focus or smeared, determined from the slope of the edges in its image. Rows and
   // columns are searched, so that motion blur in one direction is not detected as blur. A blurred camera is still
@@ -92,8 +95,12 @@ class CameraMonitor {
     int missed = 0;                       // frames since its last image
     std::optional<TimeNs> last_image_ns;  // time of its last image, or of the first frame
   };
+  // Per camera, whether it shows a still picture. Black and over-exposed images are not compared.
+  std::vector<std::uint8_t> find_still(const Health& images, TimeNs time_ns);
+
   const HealthOptions options_;
   std::vector<Camera> cameras_;
+  StillViews still_views_;
 };
 
 }  // namespace bslam::tracking

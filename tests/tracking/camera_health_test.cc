@@ -131,12 +131,26 @@ TEST(CameraMonitor, ACameraThatWasFrozenForLongIsReadmittedAfterSeveralImages) {
   EXPECT_EQ(outages(monitor, {good(9), good(1009)})[1], CameraReason::kNone);
 }
 
-TEST(CameraMonitor, AnImageWithOneChangedPixelIsNotFrozen) {
+TEST(CameraMonitor, AnImageWithOneChangedPixelIsNotRepeated) {
   CameraMonitor monitor(2, {});
   image::Image almost = good(2);
   outages(monitor, {good(1), good(2)});
+  EXPECT_TRUE(examine(monitor, {good(1), good(2)}).repeated);
   almost.row(kHeight - 1)[kWidth - 1] ^= 1;
-  EXPECT_EQ(outages(monitor, {good(3), almost}), (Outages{CameraReason::kNone, CameraReason::kNone}));
+  const ImageFaults faults = examine(monitor, {good(1), almost});
+  EXPECT_FALSE(faults.repeated);
+  EXPECT_EQ(faults.outage[1], CameraReason::kNone);
+}
+
+// The picture of a stalled encoder, with noise.
+TEST(CameraMonitor, ACameraThatShowsAStillPictureIsFrozen) {
+  CameraMonitor monitor(2, {});
+  outages(monitor, {good(1), good(2)});
+  for (std::uint64_t k = 3; k < 8; ++k) {
+    image::Image almost = good(2);
+    almost.row(static_cast<int>(k))[k] ^= 1;
+    EXPECT_EQ(outages(monitor, {good(k), almost}), (Outages{CameraReason::kNone, CameraReason::kFrozen})) << k;
+  }
 }
 
 TEST(CameraMonitor, ReadmitsAfterConsecutiveGoodImages) {
