@@ -125,6 +125,17 @@ bool is_mistaken(const PairEvidence& given, const PairEvidence& refined) {
          (given.verdict == Convention::kMirrored || explained >= kClearly * given.agreeing[0]);
 }
 
+// Whether the refinement has changed the length of the baseline of a pair by far more than calibrations are wrong. The
+// scale, which is that of the given lengths, is then wrong as well.
+bool has_other_length(const camera::Rig& given, const camera::Rig& refined, std::size_t i, std::size_t j) {
+  constexpr double kLonger = 1.4;
+  const auto length = [&](const camera::Rig& rig) {
+    return (rig.rig_from_cam(j).translation() - rig.rig_from_cam(i).translation()).norm();
+  };
+  const double before = length(given), after = length(refined);
+  return after > kLonger * before || before > kLonger * after;
+}
+
 }  // namespace
 
 bool CameraPair::hardly_matched() const {
@@ -179,8 +190,9 @@ std::vector<CameraPair> test_pairs(const map::BundledMap& map, std::span<const K
     const PairEvidence refined = judge_pair(final_rig, i, j, views.first, views.second);
     const bool mistaken = is_mistaken(*pair.evidence, refined);
     if (mistaken) pair.keyframes = static_cast<int>(common[p].size());
-    pair.contradicted =
-        mistaken || (!was_matched && shows_another_arrangement(*pair.evidence) && !explained_by(refined));
+    const bool replaced = explained_by(refined) && !explained_by(*pair.evidence);
+    pair.contradicted = mistaken || (replaced && has_other_length(given, final_rig, i, j)) ||
+                        (shows_another_arrangement(*pair.evidence) && !explained_by(refined));
   }
   return pairs;
 }

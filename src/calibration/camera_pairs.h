@@ -46,9 +46,9 @@ bool shows_another_arrangement(const PairEvidence& evidence);
 
 // All pairs of the cameras of a run, by keyframes `keyframes` of its map. `given` and `final_rig`: the calibration of
 // the run before and after its refinement, whose camera 0 is camera `first_camera` of the map. A pair is contradicted
-// only if both are. `suspected`: the images contradict the calibration, so that pairs with matches are tested as
-// well, because a refinement can make wrong matches of mirrored images or exchanged cameras fit. Takes some 10 ms per
-// pair that is tested.
+// only if both are, or if the refinement explains its images by a baseline of another length. `suspected`: the images
+// contradict the calibration, so that pairs with matches are tested as well, because a refinement can make wrong
+// matches of mirrored images or exchanged cameras fit. Takes some 10 ms per pair that is tested.
 std::vector<CameraPair> test_pairs(const map::BundledMap& map, std::span<const KeyframeId> keyframes,
                                    std::size_t first_camera, const camera::Rig& given, const camera::Rig& final_rig,
                                    bool suspected = false);

@@ -119,7 +119,8 @@ void add_calibration(const RecordInput& input, RunRecord& record) {
   for (const calibration::MoveEstimate& m : calibration.estimate.moves)
     calibration.moves.push_back({m.camera, seconds(input, m.time_ns), m.change_deg, m.std_deg, m.change_mm, m.std_mm});
   if (const auto& jump = calibration.estimate.jump) calibration.jump_at_s = seconds(input, jump->time_ns);
-  const bool suspected = calibration.estimate.verdict == calibration::Verdict::kInconsistent;
+  const bool suspected = calibration.estimate.verdict == calibration::Verdict::kInconsistent ||
+                         input.system.snapshot()->scale() != map::Scale::kMetric;
   calibration.pairs =
       calibration::disagreeing_pairs(*input.system.snapshot(), input.system.first_keyframe(),
                                      input.system.first_camera(), input.dataset.rig, input.system.rig(), suspected);

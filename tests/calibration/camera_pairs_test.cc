@@ -112,6 +112,25 @@ TEST(CameraPairs, RevealExchangedCamerasThatWereMatched) {
   EXPECT_FALSE(found[0].contradicted);
 }
 
+// A translation in the axes of another frame. The refinement has found the direction of the baseline, but not its
+// length.
+TEST(CameraPairs, RevealABaselineThatWasRefinedToAnotherLength) {
+  const camera::Rig rig = centred_pair();
+  const map::SimulatedMap seen = seen_by(rig, 0.8);
+  const auto with_centre = [&](const Eigen::Vector3d& centre) {
+    return camera::Rig(
+        {{rig.camera(std::size_t{0}), rig.body_from_cam(0)},
+         {rig.camera(std::size_t{1}), rig.body_from_cam(0) * geometry::SE3(rig.rig_from_cam(1).rotation(), centre)}});
+  };
+  const Eigen::Vector3d centre = rig.rig_from_cam(1).translation();
+  const camera::Rig wrong = with_centre({centre.z(), centre.x(), centre.y()});
+  for (const auto& [factor, contradicted] : {std::pair(0.5, true), std::pair(1.05, false)}) {
+    const auto pairs = test_pairs(seen.map, seen.map.keyframe_ids(), 0, wrong, with_centre(factor * centre), true);
+    ASSERT_TRUE(pairs[0].evidence);
+    EXPECT_EQ(pairs[0].contradicted, contradicted) << factor << ": " << describe_pair(*pairs[0].evidence);
+  }
+}
+
 TEST(CameraPairs, OfDarkOrSeparateViewsAreNotAccused) {
   const camera::Rig rig = turned_pair();
   const std::array exchange = {1, 0};
