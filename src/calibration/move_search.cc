@@ -11,9 +11,9 @@ namespace bslam::calibration {
 namespace {
 
 constexpr double kMillimetresPerMetre = 1000.0;
-constexpr int kMaxMoves = 5;        // further moves; if others remain, moves are not the reason
-constexpr int kMaxDropped = 3;      // moves that are tried without success
-constexpr int kMaxCorrections = 3;  // of the times of moves
+constexpr std::size_t kMaxMoves = 5;  // of a recording; if others remain, moves are not the reason
+constexpr int kMaxDropped = 3;        // moves that are tried without success
+constexpr int kMaxCorrections = 3;    // of the times of moves
 // A move is accepted if the camera turned or was displaced by so many standard deviations and more than these bounds.
 // On recordings without moves, the estimates were below 0.035 degrees and 4.5 mm.
 constexpr double kMinMoveSigmas = 6, kMinTurn_deg = 0.04, kMinShift_mm = 5;
@@ -178,7 +178,7 @@ RigEstimate estimate_rig_and_moves(const EstimateInput& input, const RigAdjustme
   // The first moves that are found may be at wrong times and be replaced by others.
   std::optional<RigEstimate> latest;
   std::vector<std::size_t> dropped;  // cameras of the latest problem
-  for (int found = 0, failed = 0; failed < kMaxDropped;) {
+  for (int failed = 0; failed < kMaxDropped;) {
     const RigEstimate& before = latest ? *latest : known;
     const auto move = likely_move(input, before, dropped);
     if (!move) break;
@@ -186,12 +186,11 @@ RigEstimate estimate_rig_and_moves(const EstimateInput& input, const RigAdjustme
       known.jump = std::move(jump);
       return known;
     }
-    if (found == kMaxMoves || search.exhausted()) return known;  // something else than moves
+    if (before.cameras.moves().size() >= kMaxMoves || search.exhausted()) return known;  // something else than moves
     RigEstimate next = search.estimate_with(before, *move);
     if (next.adjusted.done && !same_moves(next.cameras.moves(), before.cameras.moves())) {
       latest = std::move(next);
       dropped.clear();
-      ++found;
     } else {
       dropped.push_back(move->camera);
       ++failed;

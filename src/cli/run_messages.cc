@@ -44,8 +44,9 @@ std::string excess_text(const session::CalibrationRecord& calibration) {
 
 // What a calibration that the images contradict means for the results.
 std::string_view consequence_text(const session::CalibrationRecord& calibration) {
-  return calibration.refined ? "; the results use the refined one"
-                             : "; it was not refined: poses and scale are less accurate than with a right one";
+  return calibration.refined    ? "; the results use the refined one"
+         : calibration.replaced ? "; the results use an estimate of it that cannot be relied on"
+                                : "; it was not refined: poses and scale are less accurate than with a right one";
 }
 
 // The reason why the estimate of the calibration does not apply.
@@ -70,6 +71,8 @@ std::string doubt_text(const session::RunRecord& record) {
   for (const std::size_t c : record.calibration.disagreeing)
     text +=
         fmt::format("{}{} shows other things than the map predicts", text.empty() ? "" : ", ", record.cameras[c].name);
+  for (const std::size_t c : record.calibration.unexplained)
+    text += fmt::format("{}the images of {} are not explained", text.empty() ? "" : ", ", record.cameras[c].name);
   return text;
 }
 

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "calibration/estimate_warnings.h"
 #include "session/warning_list.h"
 
@@ -16,12 +18,19 @@ void warn_of_extrinsics(const CameraRecord& camera, bool advise, Warnings& warni
        advise && !e->refined ? "; use the estimate with --set calibration.refine=true" : "");
 }
 
+// Returns true if what is said about a camera explains what looks like wrong extrinsics of it.
+bool is_explained(const RunRecord& record, std::size_t camera) {
+  const CalibrationRecord& calibration = record.calibration;
+  return (calibration.late && calibration.late->camera == camera) ||
+         (calibration.estimate.jump && calibration.estimate.jump->camera == camera) ||
+         std::ranges::count(calibration.unexplained, camera) > 0;
+}
+
 // Warns of cameras that were moved during the run. Of two cameras, it is not known which one was moved. What looks like
-// moves of a camera whose images are late is not said.
+// moves of a camera whose images are late, for example, is not said.
 void warn_of_moves(const RunRecord& record, Warnings& warnings) {
-  const auto& late = record.calibration.late;
   for (const CameraMoveRecord& move : record.calibration.moves) {
-    if (move.camera >= record.cameras.size() || (late && late->camera == move.camera)) continue;
+    if (move.camera >= record.cameras.size() || is_explained(record, move.camera)) continue;
     warn(warnings,
          "{}: moved relative to {} at about {:.1f} s, by {:.2f} deg (std {:.2f}) and {:.1f} mm (std {:.1f}); {}",
          record.cameras[move.camera].name, record.cameras.size() == 2 ? record.cameras[0].name : "the other cameras",
@@ -40,10 +49,20 @@ void warn_of_time_jump(const RunRecord& record, Warnings& warnings) {
                                                  fmt::format("{:.1f} s", record.calibration.jump_at_s)));
 }
 
-// Returns true if the time stamps of a camera changed during the run, which also displaces its extrinsics.
-bool has_time_jump(const RunRecord& record, const CameraRecord& camera) {
-  const auto& jump = record.calibration.estimate.jump;
-  return jump && jump->camera == static_cast<std::size_t>(&camera - record.cameras.data());
+// Warns of cameras whose images are not explained, unless another warning names them.
+void warn_of_unexplained(const RunRecord& record, Warnings& warnings) {
+  const CalibrationRecord& calibration = record.calibration;
+  for (const std::size_t c : calibration.unexplained) {
+    const bool named = std::ranges::count(calibration.disagreeing, c) > 0 ||
+                       (calibration.estimate.jump && calibration.estimate.jump->camera == c) ||
+                       (calibration.late && calibration.late->camera == c);
+    if (named) continue;
+    warn(warnings,
+         "{}: its reprojection error of {:.2f} px is more than twice that of the other cameras, and fewer of its "
+         "matches "
+         "are inliers ({:.0f} %): its intrinsics, its extrinsics or its time stamps are wrong, or it is out of focus",
+         record.cameras[c].name, record.cameras[c].residuals.rms_px, 100 * inlier_share(record, c).value_or(0));
+  }
 }
 
 std::string what_became_of_estimate(const RunRecord& record) {
@@ -75,8 +94,9 @@ std::vector<std::string> estimate_warnings(const RunRecord& record, const camera
   const bool contradicted = calibration.estimate.verdict == calibration::Verdict::kInconsistent;
   warn_of_moves(record, warnings);
   warn_of_time_jump(record, warnings);
-  for (const CameraRecord& camera : record.cameras) {
-    if (!has_time_jump(record, camera)) warn_of_extrinsics(camera, calibration.applies && !contradicted, warnings);
+  warn_of_unexplained(record, warnings);
+  for (std::size_t c = 0; c < record.cameras.size(); ++c) {
+    if (!is_explained(record, c)) warn_of_extrinsics(record.cameras[c], calibration.applies && !contradicted, warnings);
   }
   const std::vector<std::string> deviations = calibration::deviation_warnings(rig, calibration.estimate);
   warnings.insert(warnings.end(), deviations.begin(), deviations.end());

@@ -124,16 +124,19 @@ void add_calibration(const RecordInput& input, RunRecord& record) {
   calibration.pairs =
       calibration::disagreeing_pairs(*input.system.snapshot(), input.system.first_keyframe(),
                                      input.system.first_camera(), input.dataset.rig, input.system.rig(), suspected);
-  if (input.complete && (never_started(record) || mostly_lost(record))) {
+  for (std::size_t c = 0; c < record.cameras.size(); ++c) {
+    if (inconsistent_fraction(record.cameras[c]) > 0.5) calibration.disagreeing.push_back(c);
+  }
+  // A run that only localises has no keyframes with which pairs could be tested.
+  const bool untested = input.config.localize_only && !calibration.disagreeing.empty();
+  if (input.complete && (never_started(record) || mostly_lost(record) || untested)) {
     PairsWithoutMap found = pairs_without_map(input.dataset);
     if (!found.contradicted.empty()) calibration.pairs = std::move(found.contradicted);
     calibration.pairs_as_given = found.as_given;
   }
-  for (std::size_t c = 0; c < record.cameras.size(); ++c) {
-    if (inconsistent_fraction(record.cameras[c]) > 0.5) calibration.disagreeing.push_back(c);
-  }
   if (input.complete && (is_contradicted(calibration) || std::ranges::any_of(record.cameras, was_inconsistent)))
     calibration.late = late_camera(input.dataset, input.system.rig());
+  calibration.unexplained = unexplained_cameras(record);
   calibration.accept_estimate(input.complete, input.system.calibration_refined());
   for (CameraRecord& camera : record.cameras) {
     if (camera.extrinsics) camera.extrinsics->refined = calibration.refined;

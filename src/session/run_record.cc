@@ -11,8 +11,13 @@ FrameOutcome RunFrame::outcome() const {
   return tracked ? FrameOutcome::kTracked : FrameOutcome::kLost;
 }
 
-void CalibrationRecord::accept_estimate(bool complete, bool replaced) {
-  applies = complete && estimate.done && !estimate.implausible && pairs.empty() && disagreeing.empty() && !late;
+bool CalibrationRecord::is_doubtful() const {
+  return !pairs.empty() || !disagreeing.empty() || !unexplained.empty() || late || estimate.jump;
+}
+
+void CalibrationRecord::accept_estimate(bool complete, bool in_map) {
+  applies = complete && estimate.done && !estimate.implausible && !is_doubtful();
+  replaced = in_map;
   refined = applies && replaced;
 }
 
@@ -23,8 +28,7 @@ bool CalibrationRecord::foreign_images() const {
 calibration::Verdict CalibrationRecord::verdict() const {
   if (foreign_images()) return calibration::Verdict::kInconsistent;
   if (estimate.verdict != calibration::Verdict::kConsistent) return estimate.verdict;
-  return pairs.empty() && disagreeing.empty() && !late && !estimate.jump ? estimate.verdict
-                                                                         : calibration::Verdict::kUnknown;
+  return is_doubtful() ? calibration::Verdict::kUnknown : estimate.verdict;
 }
 
 double MemoryReport::sum_mb() const {
@@ -142,6 +146,39 @@ std::optional<double> inlier_share(const RunRecord& record, std::size_t camera) 
   }
   if (matched == 0) return std::nullopt;
   return static_cast<double>(inliers) / static_cast<double>(matched);
+}
+
+namespace {
+
+// The median of the values of all cameras but one; 0 without others.
+double median_of_others(std::vector<double> values, std::size_t camera) {
+  values.erase(values.begin() + static_cast<std::ptrdiff_t>(camera));
+  std::erase(values, 0.0);
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
+  std::ranges::nth_element(values, middle);
+  return *middle;
+}
+
+}  // namespace
+
+std::vector<std::size_t> unexplained_cameras(const RunRecord& record) {
+  constexpr double kMoreError = 2, kFewerInliers = 0.9;
+  constexpr std::size_t kMinObservations = 200;
+  std::vector<double> rms_px(record.cameras.size(), 0), shares(record.cameras.size(), 0);
+  for (std::size_t c = 0; c < record.cameras.size(); ++c) {
+    const auto share = inlier_share(record, c);
+    if (record.cameras[c].residuals.observations < kMinObservations || !share) continue;
+    rms_px[c] = record.cameras[c].residuals.rms_px;
+    shares[c] = *share;
+  }
+  std::vector<std::size_t> out;
+  for (std::size_t c = 0; c < record.cameras.size(); ++c) {
+    const double of_others = median_of_others(rms_px, c);
+    if (of_others > 0 && rms_px[c] > kMoreError * of_others && shares[c] < kFewerInliers * median_of_others(shares, c))
+      out.push_back(c);
+  }
+  return out;
 }
 
 }  // namespace bslam::session

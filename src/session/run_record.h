@@ -98,12 +98,17 @@ struct CalibrationRecord {
       0;  // if no map was started or most frames were lost: pairs whose images agree with the calibration
   bool scale_unfounded = false;  // the scale is not reliable: there are no two consistent cameras that determine it
   std::vector<std::size_t> disagreeing = {};  // cameras that were inconsistent for most of the run
+  // Cameras whose images neither the calibration nor its estimate explains as well as those of the others.
+  std::vector<std::size_t> unexplained = {};
+  bool replaced = false;  // the final map uses an estimated rig, whether it applies or not
   // Tested if the images contradict the calibration, or if a camera was inconsistent for some time.
   std::optional<calibration::LateCamera> late = {};
 
-  // Sets `applies` and `refined`. `complete`: the run was not interrupted; the map of an interrupted run may use an
-  // estimate from its beginning, of which nothing is known. `replaced`: the map uses an estimated rig.
-  void accept_estimate(bool complete, bool replaced);
+  // Sets `applies`, `replaced` and `refined`. `complete`: the run was not interrupted; the map of an interrupted run
+  // may use an estimate from its beginning, of which nothing is known. `in_map`: the map uses an estimated rig.
+  void accept_estimate(bool complete, bool in_map);
+  // Returns true if cameras disagree with each other, so that a verdict from what agrees says little.
+  bool is_doubtful() const;
   // Returns true if the images are not those of the calibrated cameras, or the calibration was read in a wrong
   // convention. Scale, map and estimate are meaningless then.
   bool foreign_images() const;
@@ -192,6 +197,10 @@ struct LostInterval {
   std::string reason;
 };
 
+// The cameras whose reprojection error is more than twice the median of the others while clearly fewer of their matches
+// are inliers: their intrinsics, extrinsics or time stamps are wrong, although the errors of inliers hardly show it.
+std::vector<std::size_t> unexplained_cameras(const RunRecord& record);
+
 std::vector<LostInterval> lost_intervals(const RunRecord& record);
 
 // An interval of consecutive frames for which the same level of reduced work was done (tracking/reduced_work.h).
@@ -225,5 +234,9 @@ std::int64_t frames_in_loaded_map(const RunRecord& record);
 
 // Returns the share of a camera's matches with landmarks that support the pose of their frame; nullopt without matches.
 std::optional<double> inlier_share(const RunRecord& record, std::size_t camera);
+// The cameras whose reprojection error is more than twice the median of the others, while clearly fewer of their
+// matches are inliers: their intrinsics, extrinsics or time stamps are wrong, although the errors of inliers hardly
+// show it.
+std::vector<std::size_t> unexplained_cameras(const RunRecord& record);
 
 }  // namespace bslam::session

@@ -153,11 +153,14 @@ ordered_json calibration_json(const RunRecord& record) {
                      {"translation_std_mm", rounded(move.std_mm, 3)}});
   }
   for (const std::size_t c : record.calibration.disagreeing) disagreeing.push_back(record.cameras[c].name);
+  ordered_json unexplained = ordered_json::array();
+  for (const std::size_t c : record.calibration.unexplained) unexplained.push_back(record.cameras[c].name);
   return {{"verdict", calibration::verdict_name(record.calibration.verdict())},
           {"excess_error", estimate.done ? rounded(estimate.excess_error, 4) : ordered_json()},
           {"excess_bound", rounded(record.calibration.excess_bound, 4)},
           {"pairs", pairs},
           {"disagreeing", disagreeing},
+          {"unexplained", unexplained},
           {"late_camera", late_json(record)},
           {"moves", moves},
           {"time_jump", time_jump_json(record)},

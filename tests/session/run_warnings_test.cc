@@ -100,6 +100,35 @@ TEST(RunWarnings, ACameraWhoseTimeStampsChangedIsNamedInsteadOfItsMoves) {
   EXPECT_FALSE(has_text(warnings, "moved relative"));
 }
 
+TEST(RunWarnings, ACameraWhoseImagesAreNotExplainedIsNamed) {
+  for (const auto& [rms_px, inliers, named] :
+       {std::tuple(0.8, 57, true), std::tuple(0.4, 57, false), std::tuple(0.8, 88, false)}) {
+    RunRecord record;
+    record.complete = true;
+    record.cameras.resize(3);
+    tracking::FrameRecord frame;
+    frame.result.status = tracking::TrackStatus::kTracking;
+    frame.result.cameras.resize(3);
+    for (std::size_t c = 0; c < 3; ++c) {
+      record.cameras[c].name = "c" + std::to_string(c);
+      record.cameras[c].residuals = {.observations = 1000, .rms_px = c == 1 ? rms_px : 0.25, .cells = {}};
+      frame.result.cameras[c].matched = 100;
+      frame.result.cameras[c].inliers = c == 1 ? inliers : 90;
+    }
+    record.frames = {{0.0, frame}};
+    EXPECT_EQ(unexplained_cameras(record), named ? std::vector<std::size_t>{1} : std::vector<std::size_t>{});
+    record.calibration.unexplained = unexplained_cameras(record);
+    record.calibration.estimate.verdict = calibration::Verdict::kConsistent;
+    record.calibration.estimate.done = true;
+    record.calibration.accept_estimate(true, true);
+    EXPECT_EQ(record.calibration.verdict(), named ? calibration::Verdict::kUnknown : calibration::Verdict::kConsistent);
+    EXPECT_EQ(record.calibration.refined, !named);
+    EXPECT_EQ(has_text(warnings_after_run(record, synthetic::ring_rig(3), ""),
+                       "c1: its reprojection error of 0.80 px is more than twice that of the other cameras"),
+              named);
+  }
+}
+
 TEST(RunWarnings, ErrorsOfTimeStampsThatWereCorrectedAreSaid) {
   const camera::Rig rig = synthetic::ring_rig(2);
   RunRecord record;
