@@ -185,7 +185,7 @@ def hash_of_the_installation(folder):
     """What a new process with the package in this folder finds."""
     command = [sys.executable, "-c", "from bslam.fleet import _tasks; print(_tasks.program_hash())"]
     environment = {**os.environ, "PYTHONPATH": str(folder)}
-    return subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
+    return subprocess.run(command, env=environment, cwd=folder, capture_output=True, text=True, check=True).stdout
 
 
 def test_other_compiled_module_is_another_version(tmp_path):

@@ -9,6 +9,7 @@ namespace {
 
 constexpr float kMoved = 3.0f;      // grey values by which half of the blocks change if a camera moves by some pixels
 constexpr float kStill = 0.15f;     // maximum change of a still picture, relative to that of the other cameras
+constexpr float kTexture = 8.0f;    // least texture of a picture that motion would change, as of texture_of
 constexpr float kStillGrey = 1.0f;  // its maximum change while nothing is known of the others
 constexpr double kLongest_s = 1.0;  // between images that are compared
 
@@ -16,6 +17,16 @@ float quantile(std::array<float, BlockMeans::kColumns * BlockMeans::kRows> value
   const auto at = values.begin() + static_cast<std::ptrdiff_t>(fraction * static_cast<double>(values.size() - 1));
   std::ranges::nth_element(values, at);
   return *at;
+}
+
+// The difference of neighbouring blocks that a tenth of them exceeds: hardly any of a blank wall, which looks the same
+// while a camera moves along it.
+float texture_of(const BlockMeans& image) {
+  std::array<float, BlockMeans::kColumns* BlockMeans::kRows> differences = {};
+  for (std::size_t i = 0; i < differences.size(); ++i) {
+    if ((i + 1) % BlockMeans::kColumns != 0) differences[i] = std::abs(image.mean[i + 1] - image.mean[i]);
+  }
+  return quantile(differences, 0.9);
 }
 
 // By how much more than half of the other cameras have changed at least; 0 without others.
@@ -74,7 +85,8 @@ std::vector<std::uint8_t> StillViews::update(std::span<const std::optional<Block
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
     if (!changes[c]) continue;
     const float others = change_of_most(changes, c);
-    cameras_[c].still |= others >= kMoved && changes[c]->most <= std::min(kStillGrey, kStill * others);
+    const bool alike = changes[c]->most <= std::min(kStillGrey, kStill * others);
+    cameras_[c].still |= others >= kMoved && alike && texture_of(*cameras_[c].reference) >= kTexture;
     out[c] = cameras_[c].still;
     all_moved &= out[c] || changes[c]->half >= kMoved;
   }

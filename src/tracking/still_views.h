@@ -32,9 +32,9 @@ class StillViews {
  public:
   explicit StillViews(std::size_t cameras) : cameras_(cameras) {}
 
-  // Per camera, whether it shows a still picture: nearly all of its image is as it was at an earlier time, while since
-  // then half or more of the images of most other cameras have changed. It is still until its image changes. `images`:
-  // of the next frame, one per camera; nullopt: it has none that can be compared.
+  // Per camera, whether it shows a still picture: it has texture, and nearly all of it is as it was at an earlier time,
+  // while since then half or more of the images of most other cameras have changed. It is still until its image
+  // changes. `images`: of the next frame, one per camera; nullopt: it has none that can be compared.
   std::vector<std::uint8_t> update(std::span<const std::optional<BlockMeans>> images, TimeNs time_ns);
 
  private:

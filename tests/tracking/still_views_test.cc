@@ -115,6 +115,20 @@ TEST(StillViews, ACameraMayBeginLater) {
   }
 }
 
+// A blank wall, with the light of a lamp on it, looks the same from everywhere.
+TEST(StillViews, ABlankWallIsNoStillPicture) {
+  StillViews views(2);
+  image::Image wall(kWidth, kHeight);
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) wall.row(y)[x] = static_cast<std::uint8_t>(90 + x / 5);
+  }
+  for (int k = 0; k < 20; ++k) {
+    const std::vector<std::optional<BlockMeans>> images = {block_means(view(0, {.shift_px = 3.0 * k}, 1).view()),
+                                                           block_means(wall.view())};
+    EXPECT_EQ(views.update(images, kInterval * k), (Still{0, 0})) << k;
+  }
+}
+
 TEST(StillViews, ASingleCameraIsNeverStill) {
   StillViewsOf views(1);
   for (int k = 0; k < 30; ++k) EXPECT_EQ(views.frame({{k < 10 ? 3.0 * k : 30.0}}), Still{0});
