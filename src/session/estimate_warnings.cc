@@ -44,7 +44,8 @@ void warn_of_moves(const RunRecord& record, Warnings& warnings) {
 // Warns of a camera whose time stamps changed during the run, unless another warning says by how much.
 void warn_of_time_jump(const RunRecord& record, Warnings& warnings) {
   const auto& jump = record.calibration.estimate.jump;
-  if (!jump || jump->camera >= record.cameras.size() || record.calibration.late) return;
+  const auto& late = record.calibration.late;
+  if (!jump || jump->camera >= record.cameras.size() || (late && late->camera == jump->camera)) return;
   warnings.push_back(calibration::time_jump_text(record.cameras[jump->camera].name, *jump,
                                                  fmt::format("{:.1f} s", record.calibration.jump_at_s)));
 }
@@ -59,8 +60,8 @@ void warn_of_unexplained(const RunRecord& record, Warnings& warnings) {
     if (named) continue;
     warn(warnings,
          "{}: its reprojection error of {:.2f} px is more than twice that of the other cameras, and fewer of its "
-         "matches "
-         "are inliers ({:.0f} %): its intrinsics, its extrinsics or its time stamps are wrong, or it is out of focus",
+         "matches are inliers ({:.0f} %): its intrinsics, its extrinsics or its time stamps are wrong, or it is out of "
+         "focus",
          record.cameras[c].name, record.cameras[c].residuals.rms_px, 100 * inlier_share(record, c).value_or(0));
   }
 }
