@@ -107,19 +107,26 @@ def test_damaged_result_is_made_again(tmp_path, text):
     assert [f.name for f in (tmp_path / "stage").iterdir()] == [folder.name]
 
 
-def test_results_are_on_the_disk_before_they_have_their_name(tmp_path, monkeypatch):
-    flushed, renamed = set(), []
-    flush, rename = os.fsync, pathlib.Path.rename
+@pytest.fixture
+def flushed(monkeypatch):
+    """The inodes of the files and folders that were written to the disk."""
+    inodes, flush = set(), os.fsync
 
     def note_flush(descriptor):
-        flushed.add(os.fstat(descriptor).st_ino)
+        inodes.add(os.fstat(descriptor).st_ino)
         flush(descriptor)
+
+    monkeypatch.setattr(os, "fsync", note_flush)
+    return inodes
+
+
+def test_results_are_on_the_disk_before_they_have_their_name(tmp_path, monkeypatch, flushed):
+    renamed, rename = [], pathlib.Path.rename
 
     def note_rename(path, target):
         renamed.append([p.name for p in (path, *path.iterdir()) if p.stat().st_ino not in flushed])
         return rename(path, target)
 
-    monkeypatch.setattr(os, "fsync", note_flush)
     monkeypatch.setattr(pathlib.Path, "rename", note_rename)
     cached(str(tmp_path), "stage", 1, lambda folder: {"size": (folder / "map.bmap").write_text("map")})
     assert renamed == [[]]
@@ -144,20 +151,14 @@ def test_file_of_a_web_server_that_sends_no_header_is_read(store, tmp_path):
     assert content() != before
 
 
-def test_copies_of_the_files_of_options_are_on_the_disk_before_they_have_their_name(tmp_path, monkeypatch):
-    flushed, named = set(), []
-    flush, replace = os.fsync, pathlib.Path.replace
-
-    def note_flush(descriptor):
-        flushed.add(os.fstat(descriptor).st_ino)
-        flush(descriptor)
+def test_copies_of_the_files_of_options_are_on_the_disk_before_they_have_their_name(tmp_path, monkeypatch, flushed):
+    named, replace = [], pathlib.Path.replace
 
     def note_name(path, target):
         named.append((pathlib.Path(target).suffix, path.stat().st_ino in flushed))
         return replace(path, target)
 
     rig = masked_rig(tmp_path / "given", 0)
-    monkeypatch.setattr(os, "fsync", note_flush)
     monkeypatch.setattr(pathlib.Path, "replace", note_name)
     _files.shared_rig(tmp_path / "cache", rig)
     assert named == [(".png", True), (".yaml", True)]

@@ -87,7 +87,7 @@ std::optional<PossibleMove> likely_move(const EstimateInput& input, const RigEst
 std::optional<TimeJump> jump_instead(const EstimateInput& input, const RigEstimate& estimate,
                                      const PossibleMove& move) {
   const auto begin = begin_of_run(input);
-  if (!begin || input.map.rig().size() < 2) return std::nullopt;
+  if (!begin) return std::nullopt;
   auto jump = likely_jump(input.map, estimate.problem, estimate.adjusted.values, move.camera, *begin);
   if (!jump || jump->chi2 <= move.chi2 || std::abs(jump->shift_s) < kMinJump_s) return std::nullopt;
   jump->camera = estimate.cameras.camera_of_rig(move.camera);

@@ -1,9 +1,11 @@
 #include "cli/run_messages.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <cstddef>
 #include <string_view>
+#include <vector>
 
 #include "cli/print_message.h"
 
@@ -51,29 +53,28 @@ std::string_view consequence_text(const session::CalibrationRecord& calibration)
 
 // The reason why the estimate of the calibration does not apply.
 std::string doubt_text(const session::RunRecord& record) {
-  std::string text;
-  for (const calibration::CameraPair& pair : record.calibration.pairs) {
-    if (pair.contradicted != record.calibration.foreign_images()) continue;
-    text += fmt::format("{}{} and {}", text.empty() ? "" : ", ", record.cameras[pair.first].name,
-                        record.cameras[pair.second].name);
+  const session::CalibrationRecord& calibration = record.calibration;
+  std::vector<std::string> reasons;
+  for (const calibration::CameraPair& pair : calibration.pairs) {
+    if (pair.contradicted != calibration.foreign_images()) continue;
+    std::string& text = reasons.emplace_back(
+        fmt::format("{} and {}", record.cameras[pair.first].name, record.cameras[pair.second].name));
     if (pair.mirrored())
       text += " have mirrored images";
     else if (pair.keyframes > 0)
       text += fmt::format(" share {:.1f} % of the features in their common view", 100 * pair.matched_share());
   }
-  if (record.calibration.foreign_images()) return text;
-  if (const auto& late = record.calibration.late)
-    text += fmt::format("{}{} is about one frame {}", text.empty() ? "" : ", ", record.cameras[late->camera].name,
-                        late->early ? "early" : "late");
-  else if (const auto& jump = record.calibration.estimate.jump)
-    text += fmt::format("{}the time stamps of {} seem to have changed", text.empty() ? "" : ", ",
-                        record.cameras[jump->camera].name);
-  for (const std::size_t c : record.calibration.disagreeing)
-    text +=
-        fmt::format("{}{} shows other things than the map predicts", text.empty() ? "" : ", ", record.cameras[c].name);
-  for (const std::size_t c : record.calibration.unexplained)
-    text += fmt::format("{}the images of {} are not explained", text.empty() ? "" : ", ", record.cameras[c].name);
-  return text;
+  if (calibration.foreign_images()) return fmt::format("{}", fmt::join(reasons, ", "));
+  if (const auto& late = calibration.late)
+    reasons.push_back(
+        fmt::format("{} is about one frame {}", record.cameras[late->camera].name, late->early ? "early" : "late"));
+  else if (const auto& jump = calibration.estimate.jump)
+    reasons.push_back(fmt::format("the time stamps of {} seem to have changed", record.cameras[jump->camera].name));
+  for (const std::size_t c : calibration.disagreeing)
+    reasons.push_back(fmt::format("{} shows other things than the map predicts", record.cameras[c].name));
+  for (const std::size_t c : calibration.unexplained)
+    reasons.push_back(fmt::format("the images of {} are not explained", record.cameras[c].name));
+  return fmt::format("{}", fmt::join(reasons, ", "));
 }
 
 // The reason why the calibration could not be tested.

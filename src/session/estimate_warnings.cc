@@ -18,19 +18,25 @@ void warn_of_extrinsics(const CameraRecord& camera, bool advise, Warnings& warni
        advise && !e->refined ? "; use the estimate with --set calibration.refine=true" : "");
 }
 
+bool is_late(const CalibrationRecord& calibration, std::size_t camera) {
+  return calibration.late && calibration.late->camera == camera;
+}
+
+// Returns true if the images of a camera are late, or its time stamps changed during the run.
+bool has_wrong_times(const CalibrationRecord& calibration, std::size_t camera) {
+  return is_late(calibration, camera) || (calibration.estimate.jump && calibration.estimate.jump->camera == camera);
+}
+
 // Returns true if what is said about a camera explains what looks like wrong extrinsics of it.
-bool is_explained(const RunRecord& record, std::size_t camera) {
-  const CalibrationRecord& calibration = record.calibration;
-  return (calibration.late && calibration.late->camera == camera) ||
-         (calibration.estimate.jump && calibration.estimate.jump->camera == camera) ||
-         std::ranges::count(calibration.unexplained, camera) > 0;
+bool is_explained(const CalibrationRecord& calibration, std::size_t camera) {
+  return has_wrong_times(calibration, camera) || std::ranges::count(calibration.unexplained, camera) > 0;
 }
 
 // Warns of cameras that were moved during the run. Of two cameras, it is not known which one was moved. What looks like
 // moves of a camera whose images are late, for example, is not said.
 void warn_of_moves(const RunRecord& record, Warnings& warnings) {
   for (const CameraMoveRecord& move : record.calibration.moves) {
-    if (move.camera >= record.cameras.size() || is_explained(record, move.camera)) continue;
+    if (move.camera >= record.cameras.size() || is_explained(record.calibration, move.camera)) continue;
     warn(warnings,
          "{}: moved relative to {} at about {:.1f} s, by {:.2f} deg (std {:.2f}) and {:.1f} mm (std {:.1f}); {}",
          record.cameras[move.camera].name, record.cameras.size() == 2 ? record.cameras[0].name : "the other cameras",
@@ -44,8 +50,7 @@ void warn_of_moves(const RunRecord& record, Warnings& warnings) {
 // Warns of a camera whose time stamps changed during the run, unless another warning says by how much.
 void warn_of_time_jump(const RunRecord& record, Warnings& warnings) {
   const auto& jump = record.calibration.estimate.jump;
-  const auto& late = record.calibration.late;
-  if (!jump || jump->camera >= record.cameras.size() || (late && late->camera == jump->camera)) return;
+  if (!jump || jump->camera >= record.cameras.size() || is_late(record.calibration, jump->camera)) return;
   warnings.push_back(calibration::time_jump_text(record.cameras[jump->camera].name, *jump,
                                                  fmt::format("{:.1f} s", record.calibration.jump_at_s)));
 }
@@ -54,10 +59,7 @@ void warn_of_time_jump(const RunRecord& record, Warnings& warnings) {
 void warn_of_unexplained(const RunRecord& record, Warnings& warnings) {
   const CalibrationRecord& calibration = record.calibration;
   for (const std::size_t c : calibration.unexplained) {
-    const bool named = std::ranges::count(calibration.disagreeing, c) > 0 ||
-                       (calibration.estimate.jump && calibration.estimate.jump->camera == c) ||
-                       (calibration.late && calibration.late->camera == c);
-    if (named) continue;
+    if (has_wrong_times(calibration, c) || std::ranges::count(calibration.disagreeing, c) > 0) continue;
     warn(warnings,
          "{}: its reprojection error of {:.2f} px is more than twice that of the other cameras, and fewer of its "
          "matches are inliers ({:.0f} %): its intrinsics, its extrinsics or its time stamps are wrong, or it is out of "
@@ -97,7 +99,8 @@ std::vector<std::string> estimate_warnings(const RunRecord& record, const camera
   warn_of_time_jump(record, warnings);
   warn_of_unexplained(record, warnings);
   for (std::size_t c = 0; c < record.cameras.size(); ++c) {
-    if (!is_explained(record, c)) warn_of_extrinsics(record.cameras[c], calibration.applies && !contradicted, warnings);
+    if (!is_explained(calibration, c))
+      warn_of_extrinsics(record.cameras[c], calibration.applies && !contradicted, warnings);
   }
   const std::vector<std::string> deviations = calibration::deviation_warnings(rig, calibration.estimate);
   warnings.insert(warnings.end(), deviations.begin(), deviations.end());

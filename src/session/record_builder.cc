@@ -107,8 +107,7 @@ bool single_camera_agrees(const RunRecord& record) {
 
 // Returns true if there is evidence against the calibration or the time stamps.
 bool is_contradicted(const CalibrationRecord& calibration) {
-  return !calibration.pairs.empty() || !calibration.disagreeing.empty() || calibration.estimate.jump ||
-         calibration.estimate.verdict == calibration::Verdict::kInconsistent;
+  return calibration.is_doubtful() || calibration.estimate.verdict == calibration::Verdict::kInconsistent;
 }
 
 void add_calibration(const RecordInput& input, RunRecord& record) {

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <iterator>
+#include <utility>
+
+#include "base/median.h"
 
 namespace bslam::session {
 
@@ -154,10 +157,7 @@ namespace {
 double median_of_others(std::vector<double> values, std::size_t camera) {
   values.erase(values.begin() + static_cast<std::ptrdiff_t>(camera));
   std::erase(values, 0.0);
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
+  return values.empty() ? 0.0 : lower_median(std::move(values));
 }
 
 }  // namespace

@@ -197,10 +197,6 @@ struct LostInterval {
   std::string reason;
 };
 
-// The cameras whose reprojection error is more than twice the median of the others while clearly fewer of their matches
-// are inliers: their intrinsics, extrinsics or time stamps are wrong, although the errors of inliers hardly show it.
-std::vector<std::size_t> unexplained_cameras(const RunRecord& record);
-
 std::vector<LostInterval> lost_intervals(const RunRecord& record);
 
 // An interval of consecutive frames for which the same level of reduced work was done (tracking/reduced_work.h).

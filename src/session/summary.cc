@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <span>
 
 #include "session/late_camera_json.h"
 
@@ -120,6 +121,12 @@ ordered_json late_json(const RunRecord& record) {
       {{"name", record.cameras[late->camera].name}, {"reference", record.cameras[late->reference].name}}, *late);
 }
 
+ordered_json names_of(const RunRecord& record, std::span<const std::size_t> cameras) {
+  ordered_json names = ordered_json::array();
+  for (const std::size_t c : cameras) names.push_back(record.cameras[c].name);
+  return names;
+}
+
 ordered_json time_jump_json(const RunRecord& record) {
   const auto& jump = record.calibration.estimate.jump;
   if (!jump || jump->camera >= record.cameras.size()) return nullptr;
@@ -133,7 +140,7 @@ ordered_json calibration_json(const RunRecord& record) {
   ordered_json cameras = ordered_json::array();
   for (std::size_t c = 0; c < estimate.cameras.size() && c < record.cameras.size(); ++c)
     cameras.push_back(calibrated_camera_json(record.cameras[c].name, estimate.cameras[c]));
-  ordered_json pairs = ordered_json::array(), disagreeing = ordered_json::array();
+  ordered_json pairs = ordered_json::array();
   for (const calibration::CameraPair& pair : record.calibration.pairs) {
     pairs.push_back(
         {{"cameras", {record.cameras[pair.first].name, record.cameras[pair.second].name}},
@@ -152,15 +159,12 @@ ordered_json calibration_json(const RunRecord& record) {
                      {"translation_mm", rounded(move.change_mm, 3)},
                      {"translation_std_mm", rounded(move.std_mm, 3)}});
   }
-  for (const std::size_t c : record.calibration.disagreeing) disagreeing.push_back(record.cameras[c].name);
-  ordered_json unexplained = ordered_json::array();
-  for (const std::size_t c : record.calibration.unexplained) unexplained.push_back(record.cameras[c].name);
   return {{"verdict", calibration::verdict_name(record.calibration.verdict())},
           {"excess_error", estimate.done ? rounded(estimate.excess_error, 4) : ordered_json()},
           {"excess_bound", rounded(record.calibration.excess_bound, 4)},
           {"pairs", pairs},
-          {"disagreeing", disagreeing},
-          {"unexplained", unexplained},
+          {"disagreeing", names_of(record, record.calibration.disagreeing)},
+          {"unexplained", names_of(record, record.calibration.unexplained)},
           {"late_camera", late_json(record)},
           {"moves", moves},
           {"time_jump", time_jump_json(record)},

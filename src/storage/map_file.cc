@@ -201,8 +201,8 @@ Result<SavedMap> map_from_bytes(std::string_view bytes, std::string file) {
 }
 
 std::string joined_warnings(const std::string& stored, const std::string& of_run) {
-  if (stored.empty() || stored.find(of_run) != std::string::npos) return stored.empty() ? of_run : stored;
-  return stored + "; " + of_run;
+  if (stored.empty()) return of_run;
+  return stored.find(of_run) != std::string::npos ? stored : stored + "; " + of_run;
 }
 
 Status write_map(const map::BundledMap& map, const MapFileInfo& info, const std::filesystem::path& file) {

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
+#include <utility>
+
+#include "base/median.h"
 
 namespace bslam::tracking {
 namespace {
@@ -13,7 +15,7 @@ constexpr float kTexture = 8.0f;    // least texture of a picture that motion wo
 constexpr float kStillGrey = 1.0f;  // its maximum change while nothing is known of the others
 constexpr double kLongest_s = 1.0;  // between images that are compared
 
-float quantile(std::array<float, BlockMeans::kColumns * BlockMeans::kRows> values, double fraction) {
+float quantile(BlockMeans::Values values, double fraction) {
   const auto at = values.begin() + static_cast<std::ptrdiff_t>(fraction * static_cast<double>(values.size() - 1));
   std::ranges::nth_element(values, at);
   return *at;
@@ -22,7 +24,7 @@ float quantile(std::array<float, BlockMeans::kColumns * BlockMeans::kRows> value
 // The difference of neighbouring blocks that a tenth of them exceeds: hardly any of a blank wall, which looks the same
 // while a camera moves along it.
 float texture_of(const BlockMeans& image) {
-  std::array<float, BlockMeans::kColumns* BlockMeans::kRows> differences = {};
+  BlockMeans::Values differences = {};
   for (std::size_t i = 0; i < differences.size(); ++i) {
     if ((i + 1) % BlockMeans::kColumns != 0) differences[i] = std::abs(image.mean[i + 1] - image.mean[i]);
   }
@@ -35,10 +37,7 @@ float change_of_most(std::span<const std::optional<BlockChange>> changes, std::s
   for (std::size_t o = 0; o < changes.size(); ++o) {
     if (o != camera && changes[o]) others.push_back(changes[o]->half);
   }
-  if (others.empty()) return 0;
-  const auto at = others.begin() + static_cast<std::ptrdiff_t>(others.size() / 2);
-  std::ranges::nth_element(others, at, std::greater<>());
-  return *at;
+  return others.empty() ? 0.0f : lower_median(std::move(others));
 }
 
 }  // namespace

@@ -16,7 +16,8 @@ namespace bslam::tracking {
 // The mean grey values of the blocks of an image. In blocks, noise is small compared with what motion changes.
 struct BlockMeans {
   static constexpr int kColumns = 24, kRows = 16;
-  std::array<float, kColumns* kRows> mean = {};
+  using Values = std::array<float, std::size_t{kColumns} * kRows>;
+  Values mean = {};
 };
 BlockMeans block_means(const image::ImageView& image);
 
