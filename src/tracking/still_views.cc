@@ -10,10 +10,14 @@ namespace bslam::tracking {
 namespace {
 
 constexpr float kMoved = 3.0f;      // grey values by which half of the blocks change if a camera moves by some pixels
+constexpr float kWholeView = 0.7f;  // minimum part of the view that changes if the camera moves
+constexpr float kChanged = 1.0f;    // grey values by which a block changes that is not still
+constexpr float kDiffers = 4.0f;    // difference of neighbouring blocks that motion would change
 constexpr float kStill = 0.15f;     // maximum change of a still picture, relative to that of the other cameras
 constexpr float kTexture = 8.0f;    // least texture of a picture that motion would change, as of texture_of
-constexpr float kStillGrey = 1.0f;  // its maximum change while nothing is known of the others
 constexpr double kLongest_s = 1.0;  // between images that are compared
+constexpr double kStopped_s = 1.5;  // from the motion of a camera to the image that it shows from then on
+constexpr int kMovedOthers = 3;     // other cameras that nothing in front of them changes at once
 
 float quantile(BlockMeans::Values values, double fraction) {
   const auto at = values.begin() + static_cast<std::ptrdiff_t>(fraction * static_cast<double>(values.size() - 1));
@@ -31,13 +35,19 @@ float texture_of(const BlockMeans& image) {
   return quantile(differences, 0.9);
 }
 
-// By how much more than half of the other cameras have changed at least; 0 without others.
-float change_of_most(std::span<const std::optional<BlockChange>> changes, std::size_t camera) {
-  std::vector<float> others;
-  for (std::size_t o = 0; o < changes.size(); ++o) {
-    if (o != camera && changes[o]) others.push_back(changes[o]->half);
+// Whether the camera moved, and not only something in front of it.
+bool moved(const BlockChange& change) { return change.half >= kMoved && change.part >= kWholeView; }
+
+// The part of the blocks that changed, among those that differ from a neighbour by more than the noise.
+float changed_part(const BlockMeans& image, const BlockMeans::Values& change) {
+  int textured = 0, changed = 0;
+  for (std::size_t i = 0; i < change.size(); ++i) {
+    const bool last = (i + 1) % BlockMeans::kColumns == 0;
+    if (std::abs(image.mean[i] - image.mean[last ? i - 1 : i + 1]) < kDiffers) continue;
+    ++textured;
+    changed += change[i] > kChanged;
   }
-  return others.empty() ? 0.0f : lower_median(std::move(others));
+  return textured > 0 ? static_cast<float>(changed) / static_cast<float>(textured) : 0.0f;
 }
 
 }  // namespace
@@ -68,32 +78,60 @@ BlockChange change_of(const BlockMeans& earlier, const BlockMeans& later) {
   for (std::size_t i = 0; i < difference.size(); ++i) difference[i] -= earlier.mean[i];
   const float of_exposure = quantile(difference, 0.5);
   for (float& d : difference) d = std::abs(d - of_exposure);
-  return {quantile(difference, 0.5), quantile(difference, 0.9)};
+  return {quantile(difference, 0.5), quantile(difference, 0.9), changed_part(earlier, difference)};
+}
+
+bool StillViews::stopped_while_moving(const Camera& camera) const {
+  return camera.moved_ns && to_seconds(camera.reference->time_ns - *camera.moved_ns) < kStopped_s;
+}
+
+// Only changes within the time in which this camera's image did not change count.
+bool StillViews::most_others_moved(std::size_t camera) const {
+  const Camera& own = cameras_[camera];
+  std::vector<float> changes;
+  int moving = 0;
+  for (std::size_t o = 0; o < cameras_.size(); ++o) {
+    const Camera& other = cameras_[o];
+    if (o == camera || !other.change || other.reference->time_ns < own.reference->time_ns) continue;
+    changes.push_back(moved(*other.change) ? other.change->half : 0.0f);
+    moving += moved(*other.change);
+  }
+  if (changes.empty() || (moving < kMovedOthers && !stopped_while_moving(own))) return false;
+  const float of_most = lower_median(std::move(changes));
+  return of_most >= kMoved && own.change->most <= std::min(kChanged, kStill * of_most);
+}
+
+bool StillViews::is_time_for_new_references(TimeNs time_ns) const {
+  const auto is_over = [&](TimeNs since) { return time_ns < since || to_seconds(time_ns - since) >= kLongest_s; };
+  if (!reference_ns_ || is_over(*reference_ns_)) return true;
+  return std::ranges::all_of(cameras_, [&](const Camera& c) {
+    return !c.newest || is_over(c.newest->time_ns) || c.still || (c.change && moved(*c.change));
+  });
 }
 
 std::vector<std::uint8_t> StillViews::update(std::span<const std::optional<BlockMeans>> images, TimeNs time_ns) {
-  std::vector<std::optional<BlockChange>> changes(cameras_.size());
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
     Camera& camera = cameras_[c];
-    if (!images[c] || !camera.reference) continue;
-    changes[c] = change_of(*camera.reference, *images[c]);
-    camera.still = camera.still && changes[c]->most <= kStillGrey;
+    if (!images[c]) continue;
+    if (!camera.newest) camera.moved_ns = time_ns;
+    camera.newest = {*images[c], time_ns};
+    if (camera.reference) camera.change = change_of(camera.reference->blocks, *images[c]);
+    camera.still = camera.still && camera.change->most <= kChanged;
   }
   std::vector<std::uint8_t> out(cameras_.size(), 0);
-  bool all_moved = true;
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
-    if (!changes[c]) continue;
-    const float others = change_of_most(changes, c);
-    const bool alike = changes[c]->most <= std::min(kStillGrey, kStill * others);
-    cameras_[c].still |= others >= kMoved && alike && texture_of(*cameras_[c].reference) >= kTexture;
-    out[c] = cameras_[c].still;
-    all_moved &= out[c] || changes[c]->half >= kMoved;
+    Camera& camera = cameras_[c];
+    if (!images[c] || !camera.change) continue;
+    camera.still |= most_others_moved(c) && texture_of(camera.reference->blocks) >= kTexture;
+    out[c] = camera.still;
   }
-  if (reference_ns_ && !all_moved && to_seconds(time_ns - *reference_ns_) < kLongest_s && time_ns >= *reference_ns_)
-    return out;
+  if (!is_time_for_new_references(time_ns)) return out;
   reference_ns_ = time_ns;
-  for (std::size_t c = 0; c < cameras_.size(); ++c) {
-    if (!cameras_[c].still) cameras_[c].reference = images[c];
+  for (Camera& camera : cameras_) {
+    if (camera.change && moved(*camera.change)) camera.moved_ns = camera.newest->time_ns;
+    if (camera.still || !camera.newest) continue;
+    camera.reference = camera.newest;
+    camera.change.reset();
   }
   return out;
 }

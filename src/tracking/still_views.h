@@ -26,25 +26,42 @@ BlockMeans block_means(const image::ImageView& image);
 struct BlockChange {
   float half = 0;  // exceeded by half of the blocks
   float most = 0;  // by a tenth of the blocks
+  // Part of the blocks that changed at all, among those that differ from their neighbours: nearly all of them change if
+  // the camera moves, but only those that it covers if something moves in front of it.
+  float part = 0;
 };
 BlockChange change_of(const BlockMeans& earlier, const BlockMeans& later);
 
+// A camera shows a still picture if nearly all of its image, which has texture, is as it was at an earlier time, while
+// since then the whole images of most other cameras have changed. Traffic around a rig at rest may do this to one or
+// two cameras for a moment, but there the picture was still before. Therefore either it must have stopped while the
+// camera moved or when the recording began, or three other cameras must have changed. It is still until it changes.
 class StillViews {
  public:
   explicit StillViews(std::size_t cameras) : cameras_(cameras) {}
 
-  // Per camera, whether it shows a still picture: it has texture, and nearly all of it is as it was at an earlier time,
-  // while since then half or more of the images of most other cameras have changed. It is still until its image
-  // changes. `images`: of the next frame, one per camera; nullopt: it has none that can be compared.
+  // Per camera, whether its image of this frame is a still picture. `images`: of the next frame, one per camera;
+  // nullopt: it has none that can be compared.
   std::vector<std::uint8_t> update(std::span<const std::optional<BlockMeans>> images, TimeNs time_ns);
 
  private:
+  struct Image {
+    BlockMeans blocks;
+    TimeNs time_ns = 0;
+  };
   struct Camera {
-    std::optional<BlockMeans> reference;  // image of the time that is compared with; if it is still, the still picture
+    std::optional<Image> reference;     // what is compared with; if it is still, the still picture
+    std::optional<Image> newest;        // its last image
+    std::optional<BlockChange> change;  // from the reference to the last image
+    std::optional<TimeNs> moved_ns;     // when it last moved between two references; at first, that of its first image
     bool still = false;
   };
+  bool stopped_while_moving(const Camera& camera) const;
+  bool most_others_moved(std::size_t camera) const;
+  bool is_time_for_new_references(TimeNs time_ns) const;
+
   std::vector<Camera> cameras_;
-  std::optional<TimeNs> reference_ns_;
+  std::optional<TimeNs> reference_ns_;  // when the references were chosen
 };
 
 }  // namespace bslam::tracking

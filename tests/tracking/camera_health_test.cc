@@ -145,9 +145,10 @@ TEST(CameraMonitor, AnImageWithOneChangedPixelIsNotRepeated) {
 // The picture of a stalled encoder, with noise.
 TEST(CameraMonitor, ACameraThatShowsAStillPictureIsFrozen) {
   CameraMonitor monitor(2, {});
-  outages(monitor, {good(1), good(2)});
+  outages(monitor, {good(1), good(1001)});
+  outages(monitor, {good(2), good(1002)});
   for (std::uint64_t k = 3; k < 8; ++k) {
-    image::Image almost = good(2);
+    image::Image almost = good(1002);
     almost.row(static_cast<int>(k))[k] ^= 1;
     EXPECT_EQ(outages(monitor, {good(k), almost}), (Outages{CameraReason::kNone, CameraReason::kFrozen})) << k;
   }
