@@ -17,6 +17,9 @@ import sys
 import tempfile
 import zipfile
 
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[1] / 'support'))
+import pip_packages  # noqa: E402
+
 TOLERANCE = 1e-6
 SKIPPED = 77
 FRAME_HZ = 20
@@ -79,22 +82,6 @@ def cases():
         yield (f'sparse truth {seed}', sparse, [(start + t, estimated_pose(t, rng, scale)) for t in frames], False)
 
 
-def python_of(venv):
-    return venv / 'bin' / 'python'
-
-
-def install_evo(venv):
-    """None, or why evo is not there."""
-    if (venv / 'bin' / 'evo_ape').exists():
-        return None
-    for command in ([sys.executable, '-m', 'venv', str(venv)],
-                    [str(python_of(venv)), '-m', 'pip', 'install', '--quiet', '--disable-pip-version-check', 'evo']):
-        p = subprocess.run(command, capture_output=True, text=True)
-        if p.returncode != 0:
-            return (p.stderr.strip() or p.stdout.strip() or 'no message').splitlines()[-1]
-    return None
-
-
 # Runs the commands on standard input, a list of lists of arguments, as the installed programs would.
 RUN_COMMANDS = """
 import importlib.metadata, json, sys
@@ -122,7 +109,7 @@ class EvoCommands:
         return result
 
     def run(self, venv):
-        p = subprocess.run([str(python_of(venv)), '-c', RUN_COMMANDS], input=json.dumps(self.commands), capture_output=True, text=True)
+        p = subprocess.run([str(pip_packages.python_of(venv)), '-c', RUN_COMMANDS], input=json.dumps(self.commands), capture_output=True, text=True)
         if p.returncode != 0:
             sys.exit(f'evo failed: {p.stderr or p.stdout}')
 
@@ -148,7 +135,7 @@ def main():
     with tempfile.TemporaryDirectory() as temporary:
         folder = pathlib.Path(temporary)
         venv = arguments.venv or folder / 'venv'
-        reason = install_evo(venv)
+        reason = None if (venv / 'bin/evo_ape').exists() else pip_packages.install(venv, 'evo')
         if reason:
             print(f'skipped: evo cannot be installed ({reason})')
             return SKIPPED

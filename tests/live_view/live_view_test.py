@@ -18,6 +18,7 @@ import unittest
 from browser_connection import SLOWNESS, Browser, View
 
 BSLAM = pathlib.Path(sys.argv.pop(1)).resolve()
+RIG = pathlib.Path(__file__).resolve().parents[1] / 'support/ring.yaml'
 FRAMES = 20
 
 
@@ -31,8 +32,8 @@ class LiveView(unittest.TestCase):
     def setUpClass(cls):
         cls.folder = tempfile.TemporaryDirectory()
         cls.data, cls.out = pathlib.Path(cls.folder.name) / 'data', pathlib.Path(cls.folder.name) / 'out'
-        subprocess.run([BSLAM, 'simulate', '--out', cls.data, '--duration', '2', '--rate', '10', '--progress', 'never'], check=True,
-                       stdout=subprocess.DEVNULL)
+        subprocess.run([BSLAM, 'simulate', '--out', cls.data, '--rig', RIG, '--duration', '2', '--rate', '10', '--progress', 'never'],
+                       check=True, stdout=subprocess.DEVNULL)
 
     @classmethod
     def tearDownClass(cls):
@@ -93,10 +94,10 @@ class LiveView(unittest.TestCase):
         browser = self.paused(view)
         browser.send('step')
         first = browser.next('frame')
-        for _ in range(3):
+        for _ in range(5):  # cameras that look aside see the map a few frames later
             browser.send('step')
         frame = first
-        while frame['index'] < first['index'] + 3:
+        while frame['index'] < first['index'] + 5:
             newer = browser.next('frame')
             self.assertGreater(newer['index'], frame['index'])
             frame = newer

@@ -14,6 +14,9 @@ import subprocess
 import sys
 import tempfile
 
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[1] / 'support'))
+import pip_packages  # noqa: E402
+
 SKIPPED = 77
 TOLERANCE_PX = 1e-3
 FORWARD = [[0, 0, 1], [-1, 0, 0], [0, -1, 0]]  # axes of a camera that looks along x of the body
@@ -99,12 +102,11 @@ def main():
     with tempfile.TemporaryDirectory() as temporary:
         work = pathlib.Path(temporary)
         venv = arguments.venv or work / 'venv'
-        python = venv / 'bin/python'
-        if not python.exists():
-            subprocess.run([sys.executable, '-m', 'venv', venv], check=True)
-            if subprocess.run([python, '-m', 'pip', 'install', '-q', 'pycolmap', 'numpy'], capture_output=True).returncode:
-                print('skipped: pycolmap cannot be installed')
-                return SKIPPED
+        python = pip_packages.python_of(venv)
+        reason = None if python.exists() else pip_packages.install(venv, 'pycolmap', 'numpy')
+        if reason:
+            print(f'skipped: pycolmap cannot be installed ({reason})')
+            return SKIPPED
         bslam = arguments.bslam.resolve()
         write_rig(work / 'rig.yaml')
         run(bslam, 'simulate', '--rig', work / 'rig.yaml', '--duration', '2', '--rate', '10', '--out', work / 'data')

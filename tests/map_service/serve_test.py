@@ -19,6 +19,8 @@ import threading
 import unittest
 
 BSLAM = pathlib.Path(sys.argv.pop(1)).resolve()
+RIG = pathlib.Path(__file__).resolve().parents[1] / 'support/ring.yaml'
+SIZE = 376, 240  # of its images
 CAMERAS = ['front_left', 'front_right', 'left', 'right']
 BOUNDARY = 'boundary0123456789'
 SLOWNESS = float(os.environ.get('BSLAM_SLOWNESS', 1))  # of a program built with a sanitizer
@@ -82,8 +84,8 @@ class Serve(unittest.TestCase):
         cls.folder = tempfile.TemporaryDirectory()
         root = pathlib.Path(cls.folder.name)
         cls.map = root / 'site.bmap'
-        subprocess.run([BSLAM, 'simulate', '--out', root / 'data', '--duration', '3', '--rate', '10', '--progress', 'never'], check=True,
-                       stdout=subprocess.DEVNULL)
+        subprocess.run([BSLAM, 'simulate', '--out', root / 'data', '--rig', RIG, '--duration', '3', '--rate', '10', '--progress', 'never'],
+                       check=True, stdout=subprocess.DEVNULL)
         subprocess.run([BSLAM, 'run', root / 'data', '--out', root / 'run', '--save-map', cls.map, '--mode', 'sequential',
                         '--progress', 'never'], check=True, stdout=subprocess.DEVNULL)
         rows = [line.split() for line in (root / 'run/trajectory.tum').read_text().splitlines() if not line.startswith('#')]
@@ -136,7 +138,7 @@ class Serve(unittest.TestCase):
 
     def test_images_of_elsewhere_have_no_pose(self):
         server = self.serve()
-        for images in ([(name, grey(752, 480, name)) for name in CAMERAS], [('left', b'P5 752 480 255\n' + bytes(752 * 480))]):
+        for images in ([(name, grey(*SIZE, name)) for name in CAMERAS], [('left', b'P5 %d %d 255\n' % SIZE + bytes(SIZE[0] * SIZE[1]))]):
             status, _, body = server.localise(images)
             self.assertEqual(status, 200)
             answer = json.loads(body)
@@ -166,7 +168,7 @@ class Serve(unittest.TestCase):
         stamps = list(self.frames)
         first, last = self.frames[stamps[0]], self.frames[stamps[-1]]
         out.append(form([first[0], last[1]]))  # images of different places
-        out.append(form([('left', grey(752, 480, 1))]))
+        out.append(form([('left', grey(*SIZE, 1))]))
         return out
 
     def test_an_answer_depends_on_the_request_only(self):
@@ -227,7 +229,7 @@ class Serve(unittest.TestCase):
         cases = [(form([('cam9', images[0][1])]), "a part 'cam9'"), (form(images[:1] * 2), 'the part front_left twice'),
                  (form([]), 'no part'), (b'', 'does not begin with the boundary'), (form(images)[:-30], 'a part that does not end'),
                  (form([('left', images[0][1][:5000])]), 'an incomplete image'), (form([('left', b'')]), 'an incomplete image'),
-                 (form([('left', grey(640, 480, 1))]), 'found an image of 640 x 480, expected 752 x 480'),
+                 (form([('left', grey(640, 480, 1))]), 'found an image of 640 x 480, expected 376 x 240'),
                  (form([('left', b'P5 99999 99999 255\n')]), 'found an image of 99999 x 99999'),
                  (form([(f'part{i}', b'') for i in range(5000)]), 'more than 4 parts')]
         for body, expected in cases:

@@ -20,6 +20,7 @@ sys.path.append(str(pathlib.Path(__file__).resolve().parents[1] / 'live_view'))
 from browser_connection import Browser, View  # noqa: E402
 
 SKIPPED = 77
+RIG = pathlib.Path(__file__).resolve().parents[1] / 'support/ring.yaml'
 FLAGS = ['--headless=new', '--no-sandbox', '--disable-gpu', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader',
          '--hide-scrollbars', '--virtual-time-budget=8000', '--enable-logging=stderr', '--v=0']
 # Writes what it finds into the title, which is part of the printed document.
@@ -73,10 +74,11 @@ def run(*command):
 
 
 def browse(browser, page, width, dark, screenshot):
-    """Returns the messages of errors, and the title of the page."""
+    """Returns the messages of errors, and the title of the page. The screenshot, which starts the browser again, may be None."""
     command = [browser, *FLAGS, f'--window-size={width},1600', *(['--force-dark-mode'] if dark else [])]
     shown = subprocess.run([*command, '--dump-dom', page.as_uri()], capture_output=True, text=True, timeout=180)
-    subprocess.run([*command, f'--screenshot={screenshot}', page.as_uri()], capture_output=True, timeout=180)
+    if screenshot:
+        subprocess.run([*command, f'--screenshot={screenshot}', page.as_uri()], capture_output=True, timeout=180)
     errors = [line for line in shown.stderr.splitlines() if 'CONSOLE' in line and ('Uncaught' in line or 'Error' in line or 'ERROR' in line)]
     title = re.search(r'<title>(.*?)</title>', shown.stdout)
     return errors, title[1] if title else ''
@@ -98,14 +100,14 @@ def live_page(bslam, folder):
         view.process.communicate()
 
 
-def check_live(bslam, browser, folder):
+def check_live(bslam, browser, folder, screenshots):
     text = (folder / 'run' / 'report.html').read_text()
     report = text.split('id="bslam-data">', 1)[1].split('</script>', 1)[0]
     page = folder / 'live.html'
     # In a file there is no host to connect to.
     page.write_text(live_page(bslam, folder).replace('<script>', '<script>window.WebSocket = class { send() {} };</script><script>', 1)
                     .replace('</body>', LIVE_PROBE.replace('REPORT', report) + '</body>'))
-    errors, title = browse(browser, page, 1400, False, folder / 'live.png')
+    errors, title = browse(browser, page, 1400, False, screenshots and folder / 'live.png')
     found = dict(item.split('=') for item in title.split()[1:] if '=' in item)
     cameras = len(json.loads(report)['rig'])
     fine = (not errors and found.get('images') == str(cameras) and int(found.get('coloured', 0)) > 100 and found.get('kept') == 'true'
@@ -115,19 +117,19 @@ def check_live(bslam, browser, folder):
     return not fine
 
 
-def check(bslam, browser, folder):
-    run(bslam, 'simulate', '--out', folder / 'data', '--duration', 2, '--rate', 10, '--progress', 'never', '--overwrite')
+def check(bslam, browser, folder, screenshots=False):
+    run(bslam, 'simulate', '--out', folder / 'data', '--rig', RIG, '--duration', 2, '--rate', 10, '--progress', 'never', '--overwrite')
     run(bslam, 'run', folder / 'data', '--out', folder / 'run', '--mode', 'sequential', '--progress', 'never', '--overwrite')
     page = folder / 'page.html'
     page.write_text((folder / 'run' / 'report.html').read_text().replace('</body>', PROBE + '</body>'))
     failed = False
     for width, dark in ((1400, False), (1400, True), (500, False)):
-        errors, title = browse(browser, page, width, dark, folder / f'report_{width}_{"dark" if dark else "light"}.png')
+        errors, title = browse(browser, page, width, dark, screenshots and folder / f'report_{width}_{"dark" if dark else "light"}.png')
         found = dict(item.split('=') for item in title.split()[1:] if '=' in item)
         fine = not errors and int(found.get('charts', 0)) >= 5 and int(found.get('colours', 0)) >= 20 and found.get('wide') == 'false'
         print(f'{width} px, {"dark" if dark else "light"}: {"fine" if fine else "wrong"}: {title} {errors}')
         failed |= not fine
-    failed |= check_live(bslam, browser, folder)
+    failed |= check_live(bslam, browser, folder, screenshots)
     return 1 if failed else 0
 
 
@@ -142,7 +144,7 @@ def main():
         return SKIPPED
     if arguments.keep:
         arguments.keep.mkdir(parents=True, exist_ok=True)
-        return check(arguments.bslam, browser, arguments.keep.resolve())
+        return check(arguments.bslam, browser, arguments.keep.resolve(), screenshots=True)
     with tempfile.TemporaryDirectory() as folder:
         return check(arguments.bslam, browser, pathlib.Path(folder))
 

@@ -11,7 +11,7 @@ FENCE = '```'
 
 
 class DocumentedCommands(unittest.TestCase):
-    def run_on(self, **pages):
+    def run_on(self, *options, **pages):
         with tempfile.TemporaryDirectory() as folder:
             root = pathlib.Path(folder)
             (root / 'docs').mkdir()
@@ -21,7 +21,7 @@ class DocumentedCommands(unittest.TestCase):
             program = root / 'program'
             program.write_text('#!/bin/sh\necho "$@" > said\n')
             program.chmod(0o755)
-            return subprocess.run([sys.executable, SCRIPT, program, '--root', root], text=True, capture_output=True)
+            return subprocess.run([sys.executable, SCRIPT, program, '--root', root, *options], text=True, capture_output=True)
 
     def test_blocks_are_run_in_order_with_the_program(self):
         result = self.run_on(b=f'{FENCE}sh\nbslam one\n{FENCE}\ntext\n{FENCE}sh\ngrep one said\n{FENCE}\n',
@@ -43,6 +43,14 @@ class DocumentedCommands(unittest.TestCase):
     def test_commands_in_comments_prepare_the_next_block(self):
         result = self.run_on(a=f'<!-- sh\ntouch file\n-->\n{FENCE}sh\nrm file\n{FENCE}\n')
         self.assertEqual(result.returncode, 0, result.stdout)
+
+    def test_the_given_rig_is_added_to_simulations_without_one(self):
+        text = (f'{FENCE}sh\nbslam simulate --out "a  b"\ngrep -x "simulate --out a  b --rig /a rig" said\n{FENCE}\n'
+                f'{FENCE}sh\nbslam simulate --rig own\ngrep -x "simulate --rig own" said\n{FENCE}\n'
+                f'{FENCE}sh\nbslam run simulate --out x\ngrep -x "run simulate --out x" said\n{FENCE}\n')
+        result = self.run_on('--rig', '/a rig', page=text)
+        self.assertEqual(result.returncode, 0, result.stdout)
+        self.assertEqual(self.run_on(page=f'{FENCE}sh\nbslam simulate\ngrep -x simulate said\n{FENCE}\n').returncode, 0)
 
     def test_pages_without_commands_are_an_error(self):
         self.assertEqual(self.run_on(a='text\n').returncode, 1)
