@@ -1,6 +1,7 @@
 // The paper's BundledKeyframe: a BundledFrame with a pose and its links in the map.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <vector>
 
@@ -25,6 +26,13 @@ struct CaptureTime {
   TimeNs correction_ns = 0;
 };
 
+// The root of a keyframe's submap as found when the map had seen a number of merges of submaps. Saves the way up the
+// spanning tree, which is as long as the submap, in every frame.
+struct KnownRoot {
+  KeyframeId id;
+  std::uint64_t num_merges = 0;
+};
+
 // `landmarks` and `covisible` are shared between versions separately from the other members, so that a change of the
 // pose copies neither. Both can be read like a const std::vector.
 struct BundledKeyframe {
@@ -33,6 +41,7 @@ struct BundledKeyframe {
   CowArray<LandmarkId> landmarks;                    // per FeatureId; invalid = none. Empty once removed
   CowArray<Covisible> covisible;                     // every keyframe with weight > 0, in order of id
   KeyframeId parent;                                 // spanning tree; invalid for the root
+  KnownRoot root;                                    // use BundledMap::root_of()
   std::vector<KeyframeId> children;                  // in order of id
   geometry::SE3 T_rig_parent;                        // once removed: its pose relative to `parent`
   // Velocity of the rig during the capture, as BundledFrame::twist; lengths in map units.

@@ -61,24 +61,6 @@ std::vector<KeyframeId> BundledMap::roots() const {
   return out;
 }
 
-KeyframeId BundledMap::root_of(KeyframeId k) const {
-  while (keyframe(k).parent.valid()) k = keyframe(k).parent;
-  return k;
-}
-
-std::vector<KeyframeId> BundledMap::root_of_each() const {
-  std::vector<KeyframeId> out(keyframes_.size());
-  std::vector<KeyframeId> path;  // from a keyframe to one whose root is known
-  for (std::size_t i = 0; i < keyframes_.size(); ++i) {
-    KeyframeId k(i);
-    for (path.clear(); !out[k.index()].valid() && keyframe(k).parent.valid(); k = keyframe(k).parent) path.push_back(k);
-    const KeyframeId root = out[k.index()].valid() ? out[k.index()] : k;
-    out[k.index()] = root;
-    for (const KeyframeId passed : path) out[passed.index()] = root;
-  }
-  return out;
-}
-
 KeyframeId BundledMap::nearest_alive_ancestor(KeyframeId k) const {
   while (k.valid() && !keyframe(k).alive) k = keyframe(k).parent;
   return k;
@@ -181,6 +163,7 @@ KeyframeId BundledMap::add_keyframe(std::shared_ptr<const frame::BundledFrame> f
   const KeyframeId parent = choose_parent(k, fallback_parent);
   if (!parent.valid()) return k;
   attach(k, parent);
+  edit(k).root = {root_of(parent), num_merges_};
   const geometry::SE3 T_rig_parent = keyframe(k).T_rig_world * keyframe(parent).T_rig_world.inverse();
   edit(k).uncertainty = geometry::transported(keyframe(parent).uncertainty, T_rig_parent);
   return k;
@@ -273,6 +256,7 @@ bool BundledMap::merge_submaps(KeyframeId child, KeyframeId parent) {
   if (!alive(child) || !alive(parent) || root_of(child) == root_of(parent)) return false;
   make_root(child);
   attach(child, parent);
+  ++num_merges_;
   return true;
 }
 

@@ -114,7 +114,8 @@ class BundledMap {
   // Roots of all submaps in ascending order, and the root of the submap of an alive keyframe.
   std::vector<KeyframeId> roots() const;
   KeyframeId root_of(KeyframeId k) const;
-  // The root of each keyframe slot. Costs one pass over all slots: for many keyframes it is faster than root_of().
+  // The root of each keyframe slot, in one pass over all slots. After a merge of submaps this is faster than root_of() for
+  // many keyframes that were there before.
   std::vector<KeyframeId> root_of_each() const;
   // Alive keyframes of the submap with this root, parents before children.
   std::vector<KeyframeId> keyframes_of_submap(KeyframeId root) const;
@@ -280,6 +281,7 @@ class BundledMap {
   KeyframeId choose_parent(KeyframeId k, KeyframeId fallback) const;
   void attach(KeyframeId child, KeyframeId parent);
   void reassign_children(KeyframeId removed);
+  void note_roots();             // that of each keyframe
   void make_root(KeyframeId k);  // makes k the root of its submap
 
   std::shared_ptr<const camera::Rig> rig_, given_rig_;
@@ -289,6 +291,7 @@ class BundledMap {
   Scale scale_ = Scale::kMetric;
   double scale_deviation_ = 0;
   int gauge_epoch_ = 0;
+  std::uint64_t num_merges_ = 0;  // of submaps
   CowOwner owner_;
   CowVector<BundledKeyframe, 1> keyframes_;
   static constexpr std::size_t kLandmarksPerChunk = ObservationColumn::kBlock;  // number of landmarks per chunk

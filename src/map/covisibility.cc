@@ -107,4 +107,29 @@ void BundledMap::reassign_children(KeyframeId removed) {
   }
 }
 
+KeyframeId BundledMap::root_of(KeyframeId k) const {
+  for (; keyframe(k).parent.valid(); k = keyframe(k).parent) {
+    if (const KnownRoot& known = keyframe(k).root; known.id.valid() && known.num_merges == num_merges_) return known.id;
+  }
+  return k;
+}
+
+std::vector<KeyframeId> BundledMap::root_of_each() const {
+  std::vector<KeyframeId> out(keyframes_.size());
+  std::vector<KeyframeId> path;  // from a keyframe to one whose root is known
+  for (std::size_t i = 0; i < keyframes_.size(); ++i) {
+    KeyframeId k(i);
+    for (path.clear(); !out[k.index()].valid() && keyframe(k).parent.valid(); k = keyframe(k).parent) path.push_back(k);
+    const KeyframeId root = out[k.index()].valid() ? out[k.index()] : k;
+    out[k.index()] = root;
+    for (const KeyframeId passed : path) out[passed.index()] = root;
+  }
+  return out;
+}
+
+void BundledMap::note_roots() {
+  const std::vector<KeyframeId> roots = root_of_each();
+  for (std::size_t i = 0; i < roots.size(); ++i) edit(KeyframeId(i)).root = {roots[i], num_merges_};
+}
+
 }  // namespace bslam::map

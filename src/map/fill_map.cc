@@ -120,6 +120,7 @@ std::optional<PartsError> BundledMap::fill(const MapParts& parts, ThreadPool& po
   alive_keyframes_ = parts.frames.size();
   next_keyframe_to_release_ = parts.frames.size();
   if (!attach_keyframes(*this, KeyframeId(0), parts.parents)) return PartsError{{}, "cyclic parents", "trees"};
+  note_roots();
   if (auto error = fill_landmarks(parts, tables)) return error;
   fill_tables(std::move(tables), pool);
   return {};

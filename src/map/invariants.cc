@@ -90,7 +90,7 @@ Broken check_covisibility(const BundledMap& map, KeyframeId k) {
   return {};
 }
 
-// Checks that every keyframe is reachable from a root.
+// Checks that every keyframe is reachable from a root, which root_of() finds.
 Broken check_tree(const BundledMap& map) {
   const std::vector<KeyframeId> ids = map.keyframe_ids();
   std::vector<KeyframeId> stack;
@@ -111,8 +111,10 @@ Broken check_tree(const BundledMap& map) {
       stack.push_back(child);
     }
   }
+  const std::vector<KeyframeId> root = map.root_of_each();
   for (const KeyframeId k : ids) {
     if (!reached.contains(k)) return name(k) + " is in no spanning tree";
+    if (map.root_of(k) != root[k.index()]) return name(k) + " is in the submap of another root than is noted";
   }
   return {};
 }

@@ -48,13 +48,16 @@ struct FramePlan {
   bool motion_unknown = false;
 };
 
-inline constexpr int kMaxPendingFrames = 10;  // number of frames in which a pending keyframe is waited for
+// A pending keyframe is waited for in this number of frames, and at high frame rates in more, for this time.
+inline constexpr int kMaxPendingFrames = 10;
+inline constexpr double kMaxPending_s = 0.3;
 
 // A keyframe that is being created from a frame that was tracked directly.
 struct PendingKeyframe {
   FrameId frame;
   map::AnchoredPose pose;          // pose of the frame from direct tracking
   std::size_t first_keyframe = 0;  // number of keyframe slots of the map when it was requested; its id is not smaller
+  TimeNs time_ns = 0;              // of the frame
   int frames = 0;                  // number of frames since the request
 };
 
@@ -179,7 +182,7 @@ class Tracker {
                                               const map::MapSnapshot& map) const;
 
   // Continues from the pending keyframe if it is in the map, as if its frame had become a keyframe when it was tracked.
-  // Gives up waiting for it after kMaxPendingFrames.
+  // Gives up waiting for it after kMaxPendingFrames and kMaxPending_s.
   std::optional<CreatedKeyframe> adopt_keyframe(const map::BundledMap& map, FrontEndState& state) const;
 
   // Completes an outcome with the ids assigned by the commit of its edit.

@@ -58,7 +58,7 @@ void Tracker::want_keyframe(const map::BundledMap& map, TrackOutcome& outcome) c
   FrontEndState& state = outcome.next;
   if (state.pending) return;
   outcome.keyframe_wanted = true;
-  state.pending = {outcome.record.result.frame, state.track.anchored, map.keyframe_slots(), 0};
+  state.pending = {outcome.record.result.frame, state.track.anchored, map.keyframe_slots(), state.planned_ns};
   // The keyframe adds them; they are lost if its features give no pose.
   state.track.pending_counts = std::exchange(state.track.visibility_counts, {});
 }
@@ -86,7 +86,8 @@ std::optional<CreatedKeyframe> Tracker::adopt_keyframe(const map::BundledMap& ma
   if (!state.pending) return std::nullopt;
   const KeyframeId keyframe = keyframe_of(map, *state.pending);
   if (!keyframe.valid()) {
-    state.keyframe_failed = ++state.pending->frames > kMaxPendingFrames;
+    const double waited_s = to_seconds(state.planned_ns - state.pending->time_ns);
+    state.keyframe_failed = ++state.pending->frames > kMaxPendingFrames && waited_s > kMaxPending_s;
     if (state.keyframe_failed) state.forget_pending();
     return std::nullopt;
   }

@@ -79,7 +79,7 @@ KeyframeId defer_keyframe(TrackerRun& run, int i) {
   const FrontEndState before = run.state;
   const FrameRecord record = run.process(run.frame(i));
   EXPECT_FALSE(record.keyframe);
-  run.state.pending = {FrameId(i), record.result.anchored, map->keyframe_slots(), 0};
+  run.state.pending = {FrameId(i), record.result.anchored, map->keyframe_slots(), run.state.planned_ns};
   auto created = run.tracker.create_keyframe({run.frame(i), before, record.result.anchored}, run.pyramids, map);
   return run.store.commit(std::move(created->edit->draft)).keyframes.front();
 }
@@ -110,14 +110,23 @@ TEST(Tracker, ContinuesFromAKeyframeThatWasCreatedLater) {
   }
 }
 
-TEST(Tracker, DoesNotWaitForeverForAKeyframe) {
+TEST(Tracker, WaitsForAKeyframeForSomeFramesAndForSomeTime) {
   TrackerRun run(synthetic::ring_rig(2));
   for (int i = 0; i < 3; ++i) run.process(run.frame(i));
-  run.state.pending = {FrameId(2), run.state.track.anchored, run.store.snapshot()->keyframe_slots(), 0};
-  int waited = 0;
-  for (; run.state.pending && waited < 100; ++waited) run.tracker.adopt_keyframe(*run.store.snapshot(), run.state);
-  EXPECT_EQ(waited, kMaxPendingFrames + 1);
-  EXPECT_TRUE(run.state.keyframe_failed);
+  const FrontEndState before = run.state;
+  for (const auto& [interval_s, expected] : {std::pair{0.1, kMaxPendingFrames + 1}, std::pair{0.0101, 30}}) {
+    run.state = before;
+    run.state.pending = {FrameId(2), run.state.track.anchored, run.store.snapshot()->keyframe_slots(),
+                         run.state.planned_ns};
+    int waited = 0;
+    for (; run.state.pending && waited < 100; ++waited) {
+      run.state.planned_ns += from_seconds(interval_s);
+      run.tracker.adopt_keyframe(*run.store.snapshot(), run.state);
+    }
+    EXPECT_EQ(waited, expected) << interval_s;
+    EXPECT_TRUE(run.state.keyframe_failed);
+  }
+  run.state.planned_ns = before.planned_ns;
   run.process(run.frame(3));
   EXPECT_FALSE(run.state.keyframe_failed);
 }
@@ -125,7 +134,8 @@ TEST(Tracker, DoesNotWaitForeverForAKeyframe) {
 TEST(Tracker, AFrameWithoutAPoseForgetsThePendingKeyframe) {
   TrackerRun run(synthetic::ring_rig(2));
   for (int i = 0; i < 4; ++i) run.process(run.frame(i));
-  run.state.pending = {FrameId(3), run.state.track.anchored, run.store.snapshot()->keyframe_slots(), 0};
+  run.state.pending = {FrameId(3), run.state.track.anchored, run.store.snapshot()->keyframe_slots(),
+                       run.state.planned_ns};
   run.process(elsewhere(run.frame(4)));
   EXPECT_FALSE(run.state.pending);
 }
@@ -134,7 +144,8 @@ TEST(Tracker, AFrameWithoutAPoseForgetsThePendingKeyframe) {
 TEST(Tracker, AFrameWithoutImagesKeepsThePendingKeyframe) {
   TrackerRun run(synthetic::ring_rig(2));
   for (int i = 0; i < 4; ++i) run.process(run.frame(i));
-  run.state.pending = {FrameId(3), run.state.track.anchored, run.store.snapshot()->keyframe_slots(), 0};
+  run.state.pending = {FrameId(3), run.state.track.anchored, run.store.snapshot()->keyframe_slots(),
+                       run.state.planned_ns};
   const std::vector<int> missing = {0, 1};
   const FrameRecord record = run.process(run.sim.frame(FrameId(4), TrackerRun::time_s(4), missing).frame);
   EXPECT_EQ(record.result.reason, LostReason::kNoImages);
