@@ -54,12 +54,14 @@ CalibrationReport report_calibration(const system::System& system, const camera:
     if (pair.contradicted && report.doubt.empty()) report.doubt = report.warnings.back();
   }
   if (!report.doubt.empty()) return report;  // the estimate is meaningless
-  const bool jumped = estimate.jump && estimate.verdict == calibration::Verdict::kConsistent;
-  if (pairs.empty() && !jumped) report.verdict = to_verdict(estimate.verdict);
+  const bool doubtful = (estimate.jump || estimate.unsteady) && estimate.verdict == calibration::Verdict::kConsistent;
+  if (pairs.empty() && !doubtful) report.verdict = to_verdict(estimate.verdict);
   if (estimate.jump) {
     report.warnings.push_back(
         calibration::time_jump_text(given.camera(estimate.jump->camera).name, *estimate.jump,
                                     fmt::format("the time stamp {:.3f} s", to_seconds(estimate.jump->time_ns))));
+  } else if (estimate.unsteady) {
+    report.warnings.push_back(calibration::unsteady_text(given.camera(*estimate.unsteady).name));
   } else {
     warn_of_extrinsics(given, estimate, report.warnings);
   }

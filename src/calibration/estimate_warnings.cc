@@ -95,7 +95,7 @@ std::vector<std::string> deviation_warnings(const camera::Rig& rig, const RigRef
   std::vector<std::string> warnings;
   for (std::size_t c = 0; c < std::min(estimate.cameras.size(), rig.size()); ++c) {
     const camera::Camera& camera = rig.camera(c);
-    if (estimate.jump && estimate.jump->camera == c) continue;
+    if ((estimate.jump && estimate.jump->camera == c) || estimate.unsteady == c) continue;
     if (estimate.verdict == Verdict::kInconsistent) {
       warn_of_intrinsics(camera, estimate.cameras[c], warnings);
       warn_of_wrong_focal_length(camera, estimate.cameras[c], warnings);
@@ -111,6 +111,13 @@ std::string time_jump_text(const std::string& camera, const TimeJump& jump, cons
       "{}: from about {} on, its images seem to have been taken {} than their time stamps say, compared with those "
       "before: check the time stamps of its images, and whether it lost or repeated some",
       camera, when, jump.shift_s > 0 ? "later" : "earlier");
+}
+
+std::string unsteady_text(const std::string& camera) {
+  return fmt::format(
+      "{}: its images contradict each other, whatever its calibration: its focus or zoom changes, its images are "
+      "stabilised electronically, its mount is loose, or its time stamps are wrong",
+      camera);
 }
 
 std::string extrinsics_text(const std::string& camera, double change_deg, double change_mm) {

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/median.h"
+
 namespace bslam::calibration {
 namespace {
 
@@ -11,7 +13,11 @@ using geometry::Matrix6d;
 using geometry::Vector6d;
 
 constexpr double kMedianChi2SixDof = 5.348;
-constexpr std::size_t kMinPairs = 4;  // of successive images
+constexpr std::size_t kMinPairs = 4;          // of successive images
+constexpr std::size_t kMinPairsOfCamera = 3;  // of successive images of a camera
+// Correlation in the images of an unsteady camera, and its minimum ratio to that of the others. Images of real rigs
+// with small errors of their times have up to 9, those of a focus that drifts by 1 % 25 or more.
+constexpr double kUnsteady = 15, kUnsteadyRatio = 5;
 
 // Adds an observation to the equations of its image.
 void add(const solver::ReprojectionProblem& problem, const solver::RigValues& values,
@@ -60,32 +66,76 @@ std::pair<Vector6d, double> best_change(const ImageEquations& all, const ImageEq
   return {change, b.dot(change)};
 }
 
+namespace {
+
+// What independent extrinsics of two successive images of a camera would gain, for all such images.
+struct ChangesBetweenImages {
+  std::vector<double> decreases;  // twice those of the cost
+  ImageEquations sum;             // of all images
+
+  // The median gain relative to that of independent errors of the same variance. `decreases` must not be empty.
+  double correlation() {
+    const auto middle = decreases.begin() + static_cast<std::ptrdiff_t>(decreases.size() / 2);
+    std::ranges::nth_element(decreases, middle);
+    const double variance = sum.squared_errors / (2.0 * sum.observations);
+    return *middle / (kMedianChi2SixDof * variance);
+  }
+};
+
+ChangesBetweenImages changes_of(std::size_t camera, std::size_t cameras, const std::vector<std::size_t>& poses,
+                                const std::vector<ImageEquations>& equations) {
+  ChangesBetweenImages out;
+  const ImageEquations* previous = nullptr;
+  for (const std::size_t pose : poses) {
+    const ImageEquations& image = equations[pose * cameras + camera];
+    if (!image.enough()) continue;
+    out.sum.add(image);
+    if (previous != nullptr) {
+      ImageEquations both = *previous;
+      both.add(image);
+      const double decrease = best_change(both, image).second;
+      if (std::isfinite(decrease)) out.decreases.push_back(decrease);
+    }
+    previous = &image;
+  }
+  return out;
+}
+
+}  // namespace
+
 double correlation_in_images(const map::BundledMap& map, const RigProblem& problem, const solver::RigValues& values) {
   const std::vector<std::size_t> poses = poses_by_time(map, problem);
   const std::vector<ImageEquations> equations = image_equations(problem, values);
   const std::size_t cameras = values.T_cam_rig.size();
-  std::vector<double> decreases;  // twice those of the cost, by independent extrinsics of two successive images
-  ImageEquations sum;
+  ChangesBetweenImages all;
   for (std::size_t c = 0; c < cameras; ++c) {
-    const ImageEquations* previous = nullptr;
-    for (const std::size_t pose : poses) {
-      const ImageEquations& image = equations[pose * cameras + c];
-      if (!image.enough()) continue;
-      sum.add(image);
-      if (previous != nullptr) {
-        ImageEquations both = *previous;
-        both.add(image);
-        const double decrease = best_change(both, image).second;
-        if (std::isfinite(decrease)) decreases.push_back(decrease);
-      }
-      previous = &image;
-    }
+    const ChangesBetweenImages changes = changes_of(c, cameras, poses, equations);
+    all.decreases.insert(all.decreases.end(), changes.decreases.begin(), changes.decreases.end());
+    all.sum.add(changes.sum);
   }
-  if (decreases.size() < kMinPairs || !(sum.squared_errors > 0)) return 1;
-  const auto middle = decreases.begin() + static_cast<std::ptrdiff_t>(decreases.size() / 2);
-  std::ranges::nth_element(decreases, middle);
-  const double variance = sum.squared_errors / (2.0 * sum.observations);
-  return std::max(1.0, *middle / (kMedianChi2SixDof * variance));
+  if (all.decreases.size() < kMinPairs || !(all.sum.squared_errors > 0)) return 1;
+  return std::max(1.0, all.correlation());
+}
+
+std::optional<std::size_t> unsteady_camera(const map::BundledMap& map, const RigProblem& problem,
+                                           const solver::RigValues& values) {
+  const std::vector<std::size_t> poses = poses_by_time(map, problem);
+  const std::vector<ImageEquations> equations = image_equations(problem, values);
+  const std::size_t cameras = values.T_cam_rig.size();
+  std::vector<std::pair<std::size_t, double>> found;  // cameras and their correlations
+  for (std::size_t c = 0; c < cameras; ++c) {
+    ChangesBetweenImages changes = changes_of(c, cameras, poses, equations);
+    if (changes.decreases.size() >= kMinPairsOfCamera && changes.sum.squared_errors > 0)
+      found.emplace_back(c, changes.correlation());
+  }
+  if (found.size() < 2) return std::nullopt;
+  const auto most = std::ranges::max_element(found, {}, &std::pair<std::size_t, double>::second);
+  std::vector<double> others;
+  for (const auto& [camera, correlation] : found) {
+    if (camera != most->first) others.push_back(correlation);
+  }
+  const double usual = lower_median(std::move(others));
+  return most->second > std::max(kUnsteady, kUnsteadyRatio * usual) ? std::optional(most->first) : std::nullopt;
 }
 
 }  // namespace bslam::calibration

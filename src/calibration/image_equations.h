@@ -1,6 +1,8 @@
 // What each image says about the extrinsics of its camera, with everything else constant.
 #pragma once
 
+#include <cstddef>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -41,5 +43,11 @@ std::pair<geometry::Vector6d, double> best_change(const ImageEquations& all, con
 // Determined from successive images of each camera, so that errors of the calibration, which are the same in all
 // images, and moves of cameras count little (docs/math.md, section 16). 1 if there are too few images.
 double correlation_in_images(const map::BundledMap& map, const RigProblem& problem, const solver::RigValues& values);
+
+// The camera of the problem whose images contradict each other as a whole from one image to the next, far more than
+// those of the other cameras do: its focal length changes, its images are stabilised, its mount is loose, or its time
+// stamps are wrong. No calibration explains it. Returns nullopt if there is none.
+std::optional<std::size_t> unsteady_camera(const map::BundledMap& map, const RigProblem& problem,
+                                           const solver::RigValues& values);
 
 }  // namespace bslam::calibration

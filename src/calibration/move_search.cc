@@ -184,8 +184,10 @@ RigEstimate estimate_rig_and_moves(const EstimateInput& input, const RigAdjustme
     if (!move) break;
     if (auto jump = jump_instead(input, before, *move)) {
       known.jump = std::move(jump);
+      known.unsteady.reset();  // the jump explains it
       return known;
     }
+    if (known.unsteady) return known;
     if (before.cameras.moves().size() >= kMaxMoves || search.exhausted()) return known;  // something else than moves
     RigEstimate next = search.estimate_with(before, *move);
     if (next.adjusted.done && !same_moves(next.cameras.moves(), before.cameras.moves())) {

@@ -138,6 +138,9 @@ RigEstimate estimate_rig(const EstimateInput& input, const RigAdjustmentOptions&
   out.cameras.separate(input.map, out.problem);
   out.path_before = path_length(out.problem);
   adjust_in_passes(input, out.cameras.added_to(prior), out);
+  if (!out.adjusted.done || !out.settled) return out;
+  if (const auto camera = unsteady_camera(input.map, out.problem, out.adjusted.values))
+    out.unsteady = out.cameras.camera_of_rig(*camera);
   return out;
 }
 

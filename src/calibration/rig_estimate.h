@@ -31,6 +31,8 @@ struct RigEstimate {
   bool settled = false;
   // The time stamps of a camera seem to have changed during the run; no moves are then part of the estimate.
   std::optional<TimeJump> jump = {};
+  // The images of a camera contradict each other (unsteady_camera); moves are then not searched.
+  std::optional<std::size_t> unsteady = {};
   double path_before = 0;  // path_length() with the rig of the map
 };
 

@@ -130,7 +130,8 @@ RigRefinement evaluate(const EstimateInput& input, RigEstimate&& estimate) {
     evaluate_timing(adjusted.cameras[c], camera);
   }
   out.jump = estimate.jump;
-  out.implausible = out.jump || is_implausible(out.cameras, input.calibrated);
+  out.unsteady = estimate.unsteady;
+  out.implausible = out.jump || out.unsteady || is_implausible(out.cameras, input.calibrated);
   out.moves = moves_of(estimate);
   out.excess_error = adjusted.excess_error;
   out.verdict = out.excess_error > input.options.inconsistent_excess ? Verdict::kInconsistent : Verdict::kConsistent;

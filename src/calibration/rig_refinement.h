@@ -162,9 +162,11 @@ struct MoveEstimate {
 
 struct RigRefinement {
   bool done = false;  // false: several cameras without metric scale, too few observations, stopped or failed
-  // Some camera was displaced by much that the images do not constrain, or its time stamps changed; never accepted.
+  // Some camera was displaced by much that the images do not constrain, its time stamps changed, or its images
+  // contradict each other; never accepted.
   bool implausible = false;
   std::optional<TimeJump> jump;              // its time stamps seem to have changed during the run
+  std::optional<std::size_t> unsteady;       // the camera whose images contradict each other (unsteady_camera)
   std::vector<CameraRefinement> cameras;     // all cameras in the order of the rig, if done
   std::vector<MoveEstimate> moves;           // in order of time; the extrinsics in `cameras` are those before them
   std::size_t keyframes = 0, landmarks = 0;  // numbers of keyframes and landmarks used

@@ -70,6 +70,8 @@ std::string doubt_text(const session::RunRecord& record) {
         fmt::format("{} is about one frame {}", record.cameras[late->camera].name, late->early ? "early" : "late"));
   else if (const auto& jump = calibration.estimate.jump)
     reasons.push_back(fmt::format("the time stamps of {} seem to have changed", record.cameras[jump->camera].name));
+  if (const auto& camera = calibration.estimate.unsteady)
+    reasons.push_back(fmt::format("the images of {} contradict each other", record.cameras[*camera].name));
   for (const std::size_t c : calibration.disagreeing)
     reasons.push_back(fmt::format("{} shows other things than the map predicts", record.cameras[c].name));
   for (const std::size_t c : calibration.unexplained)

@@ -106,7 +106,9 @@ Status group(const DatasetRequest& request, const std::vector<std::vector<image_
       if (const Status status = check_common_clock(images[i], images[0], name, camera0, request.path); !status)
         return status;
     }
-    if (grouping.beside_camera0[i] > 0) {
+    // A camera with more images than camera 0 has some between them.
+    const auto more = std::max<std::ptrdiff_t>(0, std::ssize(images[i]) - std::ssize(images[0]));
+    if (grouping.beside_camera0[i] > more) {
       dataset.warnings.push_back(fmt::format(
           "{}: {} of {} images are not within {:g} ms of an image of {} and are in frames of their own "
           "(see io.sync_tolerance)",

@@ -114,8 +114,8 @@ class BundledMap {
   // Roots of all submaps in ascending order, and the root of the submap of an alive keyframe.
   std::vector<KeyframeId> roots() const;
   KeyframeId root_of(KeyframeId k) const;
-  // The root of each keyframe slot, in one pass over all slots. After a merge of submaps this is faster than root_of() for
-  // many keyframes that were there before.
+  // The root of each keyframe slot, in one pass over all slots. After a merge of submaps this is faster than root_of()
+  // for many keyframes that were there before.
   std::vector<KeyframeId> root_of_each() const;
   // Alive keyframes of the submap with this root, parents before children.
   std::vector<KeyframeId> keyframes_of_submap(KeyframeId root) const;

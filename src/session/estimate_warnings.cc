@@ -29,7 +29,8 @@ bool has_wrong_times(const CalibrationRecord& calibration, std::size_t camera) {
 
 // Returns true if what is said about a camera explains what looks like wrong extrinsics of it.
 bool is_explained(const CalibrationRecord& calibration, std::size_t camera) {
-  return has_wrong_times(calibration, camera) || std::ranges::count(calibration.unexplained, camera) > 0;
+  return has_wrong_times(calibration, camera) || calibration.estimate.unsteady == camera ||
+         std::ranges::count(calibration.unexplained, camera) > 0;
 }
 
 // Warns of cameras that were moved during the run. Of two cameras, it is not known which one was moved. What looks like
@@ -55,11 +56,19 @@ void warn_of_time_jump(const RunRecord& record, Warnings& warnings) {
                                                  fmt::format("{:.1f} s", record.calibration.jump_at_s)));
 }
 
+void warn_of_unsteady(const RunRecord& record, Warnings& warnings) {
+  const auto& camera = record.calibration.estimate.unsteady;
+  if (!camera || *camera >= record.cameras.size() || has_wrong_times(record.calibration, *camera)) return;
+  warnings.push_back(calibration::unsteady_text(record.cameras[*camera].name));
+}
+
 // Warns of cameras whose images are not explained, unless another warning names them.
 void warn_of_unexplained(const RunRecord& record, Warnings& warnings) {
   const CalibrationRecord& calibration = record.calibration;
   for (const std::size_t c : calibration.unexplained) {
-    if (has_wrong_times(calibration, c) || std::ranges::count(calibration.disagreeing, c) > 0) continue;
+    if (has_wrong_times(calibration, c) || calibration.estimate.unsteady == c ||
+        std::ranges::count(calibration.disagreeing, c) > 0)
+      continue;
     warn(warnings,
          "{}: its reprojection error of {:.2f} px is more than twice that of the other cameras, and fewer of its "
          "matches are inliers ({:.0f} %): its intrinsics, its extrinsics or its time stamps are wrong, or it is out of "
@@ -80,6 +89,8 @@ std::string what_became_of_estimate(const RunRecord& record) {
         record.cameras[late->camera].name);
   }
   if (calibration.estimate.jump) return "the estimate is not used, since the time stamps of a camera changed";
+  if (calibration.estimate.unsteady)
+    return "the estimate is not used, since the images of a camera contradict each other";
   return "the estimate cannot be used for other recordings, because the images of some cameras disagree as a whole: "
          "their time stamps or extrinsics may be far off";
 }
@@ -97,6 +108,7 @@ std::vector<std::string> estimate_warnings(const RunRecord& record, const camera
   const bool contradicted = calibration.estimate.verdict == calibration::Verdict::kInconsistent;
   warn_of_moves(record, warnings);
   warn_of_time_jump(record, warnings);
+  warn_of_unsteady(record, warnings);
   warn_of_unexplained(record, warnings);
   for (std::size_t c = 0; c < record.cameras.size(); ++c) {
     if (!is_explained(calibration, c))

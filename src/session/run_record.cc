@@ -15,7 +15,7 @@ FrameOutcome RunFrame::outcome() const {
 }
 
 bool CalibrationRecord::is_doubtful() const {
-  return !pairs.empty() || !disagreeing.empty() || !unexplained.empty() || late || estimate.jump;
+  return !pairs.empty() || !disagreeing.empty() || !unexplained.empty() || late || estimate.jump || estimate.unsteady;
 }
 
 void CalibrationRecord::accept_estimate(bool complete, bool in_map) {

@@ -127,6 +127,11 @@ ordered_json names_of(const RunRecord& record, std::span<const std::size_t> came
   return names;
 }
 
+ordered_json unsteady_json(const RunRecord& record) {
+  const auto& camera = record.calibration.estimate.unsteady;
+  return camera && *camera < record.cameras.size() ? ordered_json(record.cameras[*camera].name) : nullptr;
+}
+
 ordered_json time_jump_json(const RunRecord& record) {
   const auto& jump = record.calibration.estimate.jump;
   if (!jump || jump->camera >= record.cameras.size()) return nullptr;
@@ -168,6 +173,7 @@ ordered_json calibration_json(const RunRecord& record) {
           {"late_camera", late_json(record)},
           {"moves", moves},
           {"time_jump", time_jump_json(record)},
+          {"unsteady", unsteady_json(record)},
           {"refined", record.calibration.refined},
           {"cameras", cameras}};
 }

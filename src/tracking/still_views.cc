@@ -81,57 +81,70 @@ BlockChange change_of(const BlockMeans& earlier, const BlockMeans& later) {
   return {quantile(difference, 0.5), quantile(difference, 0.9), changed_part(earlier, difference)};
 }
 
-bool StillViews::stopped_while_moving(const Camera& camera) const {
-  return camera.moved_ns && to_seconds(camera.reference->time_ns - *camera.moved_ns) < kStopped_s;
-}
-
-// Only changes within the time in which this camera's image did not change count.
-bool StillViews::most_others_moved(std::size_t camera) const {
+// Only changes of others within the time in which this camera's image did not change count.
+bool StillViews::is_alone(std::size_t camera, Compared compared) const {
   const Camera& own = cameras_[camera];
+  const Comparison& of_own = *(own.*compared);
   std::vector<float> changes;
   int moving = 0;
   for (std::size_t o = 0; o < cameras_.size(); ++o) {
-    const Camera& other = cameras_[o];
-    if (o == camera || !other.change || other.reference->time_ns < own.reference->time_ns) continue;
-    changes.push_back(moved(*other.change) ? other.change->half : 0.0f);
-    moving += moved(*other.change);
+    const auto& other = cameras_[o].*compared;
+    if (o == camera || !other || other->since_ns < of_own.since_ns) continue;
+    changes.push_back(moved(other->change) ? other->change.half : 0.0f);
+    moving += moved(other->change);
   }
-  if (changes.empty() || (moving < kMovedOthers && !stopped_while_moving(own))) return false;
+  const bool stopped_in_motion = own.moved_ns && to_seconds(of_own.since_ns - *own.moved_ns) < kStopped_s;
+  if (changes.empty() || (moving < kMovedOthers && !stopped_in_motion)) return false;
   const float of_most = lower_median(std::move(changes));
-  return of_most >= kMoved && own.change->most <= std::min(kChanged, kStill * of_most);
+  return of_most >= kMoved && of_own.change.most <= std::min(kChanged, kStill * of_most);
 }
 
 bool StillViews::is_time_for_new_references(TimeNs time_ns) const {
   const auto is_over = [&](TimeNs since) { return time_ns < since || to_seconds(time_ns - since) >= kLongest_s; };
   if (!reference_ns_ || is_over(*reference_ns_)) return true;
   return std::ranges::all_of(cameras_, [&](const Camera& c) {
-    return !c.newest || is_over(c.newest->time_ns) || c.still || (c.change && moved(*c.change));
+    return !c.newest || is_over(c.newest->time_ns) || c.still ||
+           (c.since_reference && moved(c.since_reference->change));
   });
 }
 
-std::vector<std::uint8_t> StillViews::update(std::span<const std::optional<BlockMeans>> images, TimeNs time_ns) {
+void StillViews::compare(std::span<const std::optional<BlockMeans>> images, TimeNs time_ns) {
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
     Camera& camera = cameras_[c];
+    camera.step.reset();
     if (!images[c]) continue;
+    const auto compared_with = [&](const Image& earlier) {
+      return Comparison{earlier.time_ns, change_of(earlier.blocks, *images[c])};
+    };
+    if (camera.newest) camera.step = compared_with(*camera.newest);
+    if (camera.reference) camera.since_reference = compared_with(*camera.reference);
     if (!camera.newest) camera.moved_ns = time_ns;
-    camera.newest = {*images[c], time_ns};
-    if (camera.reference) camera.change = change_of(camera.reference->blocks, *images[c]);
-    camera.still = camera.still && camera.change->most <= kChanged;
   }
+}
+
+std::vector<std::uint8_t> StillViews::update(std::span<const std::optional<BlockMeans>> images, TimeNs time_ns) {
+  compare(images, time_ns);
   std::vector<std::uint8_t> out(cameras_.size(), 0);
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
     Camera& camera = cameras_[c];
-    if (!images[c] || !camera.change) continue;
-    camera.still |= most_others_moved(c) && texture_of(camera.reference->blocks) >= kTexture;
-    out[c] = camera.still;
+    if (!images[c]) continue;
+    if (camera.since_reference) {
+      camera.still &= camera.since_reference->change.most <= kChanged;
+      camera.still |= is_alone(c, &Camera::since_reference) && texture_of(camera.reference->blocks) >= kTexture;
+    }
+    const bool repeated = camera.step && is_alone(c, &Camera::step) && texture_of(camera.newest->blocks) >= kTexture;
+    out[c] = camera.still || repeated;
+  }
+  for (std::size_t c = 0; c < cameras_.size(); ++c) {
+    if (images[c]) cameras_[c].newest = {*images[c], time_ns};
   }
   if (!is_time_for_new_references(time_ns)) return out;
   reference_ns_ = time_ns;
   for (Camera& camera : cameras_) {
-    if (camera.change && moved(*camera.change)) camera.moved_ns = camera.newest->time_ns;
+    if (camera.since_reference && moved(camera.since_reference->change)) camera.moved_ns = camera.newest->time_ns;
     if (camera.still || !camera.newest) continue;
     camera.reference = camera.newest;
-    camera.change.reset();
+    camera.since_reference.reset();
   }
   return out;
 }

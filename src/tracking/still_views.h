@@ -36,6 +36,7 @@ BlockChange change_of(const BlockMeans& earlier, const BlockMeans& later);
 // since then the whole images of most other cameras have changed. Traffic around a rig at rest may do this to one or
 // two cameras for a moment, but there the picture was still before. Therefore either it must have stopped while the
 // camera moved or when the recording began, or three other cameras must have changed. It is still until it changes.
+// Single images that repeat the one before, as in a video of a constant frame rate, are still as well.
 class StillViews {
  public:
   explicit StillViews(std::size_t cameras) : cameras_(cameras) {}
@@ -49,15 +50,23 @@ class StillViews {
     BlockMeans blocks;
     TimeNs time_ns = 0;
   };
+  // From an earlier image of a camera to its last one.
+  struct Comparison {
+    TimeNs since_ns = 0;
+    BlockChange change;
+  };
   struct Camera {
-    std::optional<Image> reference;     // what is compared with; if it is still, the still picture
-    std::optional<Image> newest;        // its last image
-    std::optional<BlockChange> change;  // from the reference to the last image
-    std::optional<TimeNs> moved_ns;     // when it last moved between two references; at first, that of its first image
+    std::optional<Image> reference;             // what is compared with; if it is still, the still picture
+    std::optional<Image> newest;                // its last image
+    std::optional<Comparison> since_reference;  // its last image compared with the reference
+    std::optional<Comparison> step;             // its image of this frame compared with the one before
+    std::optional<TimeNs> moved_ns;  // when it last moved between two references; at first, that of its first image
     bool still = false;
   };
-  bool stopped_while_moving(const Camera& camera) const;
-  bool most_others_moved(std::size_t camera) const;
+  using Compared = std::optional<Comparison> Camera::*;
+  void compare(std::span<const std::optional<BlockMeans>> images, TimeNs time_ns);
+  // Whether only this camera has not changed, while most others moved.
+  bool is_alone(std::size_t camera, Compared compared) const;
   bool is_time_for_new_references(TimeNs time_ns) const;
 
   std::vector<Camera> cameras_;

@@ -101,6 +101,30 @@ TEST(TimeJump, LeavesTheCalibrationAsItIs) {
       "with those before: check the time stamps of its images, and whether it lost or repeated some");
 }
 
+// The images of a camera are displaced at random, as by electronic stabilisation.
+TEST(UnsteadyCamera, IsNamedAndNothingIsRefined) {
+  for (const std::size_t cameras : {2u, 4u}) {
+    const camera::Rig rig = cameras == 2 ? synthetic::default_rig() : synthetic::ring_rig(4);
+    Random random(8, "stabilisation");
+    const RigRefinement result = refined(map_of(rig, 0, [&](double) {
+      const Eigen::Vector3d turn(random.uniform(-4e-3, 4e-3), random.uniform(-4e-3, 4e-3), 0);
+      return SE3(geometry::so3_exp(turn), Eigen::Vector3d::Zero()) * rig.cam_from_rig(1);
+    }));
+    ASSERT_TRUE(result.done);
+    EXPECT_EQ(result.unsteady, 1u) << cameras;
+    EXPECT_TRUE(result.moves.empty());
+    EXPECT_FALSE(accepted(result, {.refine = Refine::kTrue}));
+    EXPECT_TRUE(deviation_warnings(rig, result).empty());
+  }
+}
+
+TEST(UnsteadyCamera, IsNoneThatIsMovedOrWrongFromTheBeginning) {
+  const camera::Rig rig = synthetic::default_rig();
+  const SE3 moved = SE3(geometry::so3_exp(Eigen::Vector3d(0.005, 0.005, 0)), Eigen::Vector3d(0.003, 0, 0));
+  for (const int from : {0, 10, kKeyframes})
+    EXPECT_FALSE(refined(map_of(rig, from, [&](double) { return moved * rig.cam_from_rig(1); })).unsteady) << from;
+}
+
 TEST(TimeJump, IsNotTakenForAMove) {
   const camera::Rig rig = synthetic::default_rig();
   constexpr double kDegree = std::numbers::pi / 180;

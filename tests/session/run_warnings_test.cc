@@ -100,6 +100,27 @@ TEST(RunWarnings, ACameraWhoseTimeStampsChangedIsNamedInsteadOfItsMoves) {
   EXPECT_FALSE(has_text(warnings, "moved relative"));
 }
 
+TEST(RunWarnings, ACameraWhoseImagesContradictEachOtherIsNamedInsteadOfItsExtrinsics) {
+  RunRecord record;
+  record.complete = true;
+  record.cameras.resize(2);
+  record.cameras[1].name = "right";
+  record.cameras[1].extrinsics = ExtrinsicsRecord{.change_deg = 0.7, .change_mm = 12, .suspect = true};
+  record.calibration.estimate.done = record.calibration.estimate.implausible = true;
+  record.calibration.estimate.unsteady = 1;
+  for (const calibration::Verdict verdict : {calibration::Verdict::kConsistent, calibration::Verdict::kInconsistent}) {
+    record.calibration.estimate.verdict = verdict;
+    record.calibration.accept_estimate(true, false);
+    EXPECT_FALSE(record.calibration.applies);
+    EXPECT_NE(record.calibration.verdict(), calibration::Verdict::kConsistent);
+    const std::vector<std::string> warnings = warnings_after_run(record, synthetic::ring_rig(2), "");
+    EXPECT_TRUE(has_text(warnings, "right: its images contradict each other, whatever its calibration"));
+    EXPECT_FALSE(has_text(warnings, "estimated extrinsics"));
+    EXPECT_EQ(has_text(warnings, "since the images of a camera contradict each other"),
+              verdict == calibration::Verdict::kInconsistent);
+  }
+}
+
 TEST(RunWarnings, ACameraWhoseImagesAreNotExplainedIsNamed) {
   for (const auto& [rms_px, inliers, named] :
        {std::tuple(0.8, 57, true), std::tuple(0.4, 57, false), std::tuple(0.8, 88, false)}) {

@@ -104,6 +104,14 @@ TEST(StillViews, SeveralAreFoundAmongMore) {
   EXPECT_EQ(found, (Still{0, 1, 1, 0}));
 }
 
+TEST(StillViews, SingleImagesMayRepeatTheOneBefore) {
+  StillViewsOf views(2);
+  for (int k = 0; k < 60; ++k) {
+    const bool repeats = k > 6 && k % 6 == 0;
+    EXPECT_EQ(views.frame({{3.0 * k}, {3.0 * (repeats ? k - 1 : k)}}), (Still{0, repeats})) << k;
+  }
+}
+
 TEST(StillViews, APictureMayBeStillFromTheBeginning) {
   StillViewsOf views(2);
   Still found;
