@@ -82,13 +82,13 @@ BlockChange change_of(const BlockMeans& earlier, const BlockMeans& later) {
 }
 
 // Only changes of others within the time in which this camera's image did not change count.
-bool StillViews::is_alone(std::size_t camera, Compared compared) const {
+bool StillViews::is_alone(std::size_t camera) const {
   const Camera& own = cameras_[camera];
-  const Comparison& of_own = *(own.*compared);
+  const Comparison& of_own = *own.since_reference;
   std::vector<float> changes;
   int moving = 0;
   for (std::size_t o = 0; o < cameras_.size(); ++o) {
-    const auto& other = cameras_[o].*compared;
+    const auto& other = cameras_[o].since_reference;
     if (o == camera || !other || other->since_ns < of_own.since_ns) continue;
     changes.push_back(moved(other->change) ? other->change.half : 0.0f);
     moving += moved(other->change);
@@ -97,6 +97,18 @@ bool StillViews::is_alone(std::size_t camera, Compared compared) const {
   if (changes.empty() || (moving < kMovedOthers && !stopped_in_motion)) return false;
   const float of_most = lower_median(std::move(changes));
   return of_most >= kMoved && of_own.change.most <= std::min(kChanged, kStill * of_most);
+}
+
+bool StillViews::repeats(std::size_t camera) const {
+  const Camera& own = cameras_[camera];
+  std::vector<float> steps;
+  for (std::size_t o = 0; o < cameras_.size(); ++o) {
+    const auto& other = cameras_[o].step;
+    if (o != camera && other && other->since_ns >= own.step->since_ns) steps.push_back(other->change.most);
+  }
+  if (steps.empty()) return false;
+  const float usual = std::min(own.pace, lower_median(std::move(steps)));
+  return usual >= kMoved && own.step->change.most <= std::min(kChanged, kStill * usual);
 }
 
 bool StillViews::is_time_for_new_references(TimeNs time_ns) const {
@@ -130,9 +142,10 @@ std::vector<std::uint8_t> StillViews::update(std::span<const std::optional<Block
     if (!images[c]) continue;
     if (camera.since_reference) {
       camera.still &= camera.since_reference->change.most <= kChanged;
-      camera.still |= is_alone(c, &Camera::since_reference) && texture_of(camera.reference->blocks) >= kTexture;
+      camera.still |= is_alone(c) && texture_of(camera.reference->blocks) >= kTexture;
     }
-    const bool repeated = camera.step && is_alone(c, &Camera::step) && texture_of(camera.newest->blocks) >= kTexture;
+    const bool repeated = camera.step && repeats(c);
+    if (camera.step) camera.pace = repeated ? camera.pace / 2 : camera.step->change.most;
     out[c] = camera.still || repeated;
   }
   for (std::size_t c = 0; c < cameras_.size(); ++c) {

@@ -62,11 +62,15 @@ class StillViews {
     std::optional<Comparison> step;             // its image of this frame compared with the one before
     std::optional<TimeNs> moved_ns;  // when it last moved between two references; at first, that of its first image
     bool still = false;
+    // BlockChange::most of the last step that was no repetition, halved by each repetition since: a rig that has
+    // stopped shows more than a few.
+    float pace = 0;
   };
-  using Compared = std::optional<Comparison> Camera::*;
   void compare(std::span<const std::optional<BlockMeans>> images, TimeNs time_ns);
   // Whether only this camera has not changed, while most others moved.
-  bool is_alone(std::size_t camera, Compared compared) const;
+  bool is_alone(std::size_t camera) const;
+  // Whether its image repeats the one before, in the middle of the motion of all.
+  bool repeats(std::size_t camera) const;
   bool is_time_for_new_references(TimeNs time_ns) const;
 
   std::vector<Camera> cameras_;

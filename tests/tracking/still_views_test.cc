@@ -108,7 +108,7 @@ TEST(StillViews, SingleImagesMayRepeatTheOneBefore) {
   StillViewsOf views(2);
   for (int k = 0; k < 60; ++k) {
     const bool repeats = k > 6 && k % 6 == 0;
-    EXPECT_EQ(views.frame({{3.0 * k}, {3.0 * (repeats ? k - 1 : k)}}), (Still{0, repeats})) << k;
+    EXPECT_EQ(views.frame({{1.5 * k}, {1.5 * (repeats ? k - 1 : k)}}), (Still{0, repeats})) << k;
   }
 }
 
@@ -152,7 +152,7 @@ TEST(StillViews, WhatCoversAPartOfTheViewIsNoMotionOfTheCamera) {
   StillViewsOf views(2);
   for (int k = 0; k < 60; ++k) {
     const auto bus = static_cast<std::uint64_t>(k);
-    const double shift_px = 4.0 * std::min(k, 10);
+    const double shift_px = k <= 10 ? 4.0 * k : 46 - 6 * std::pow(0.6, k - 10);  // the vehicle stops
     EXPECT_EQ(views.frame({{.shift_px = shift_px, .person_until = k > 10 ? 0.6 : 0.0, .person = bus}, {shift_px}}),
               (Still{0, 0}))
         << k;
