@@ -39,6 +39,37 @@ void add(const solver::ReprojectionProblem& problem, const solver::RigValues& va
   if (sums.observations == kMinObservations) sums.keyframes = 1;
 }
 
+// What independent extrinsics of two successive images of a camera would gain, for all such images.
+struct ChangesBetweenImages {
+  std::vector<double> decreases;  // twice those of the cost
+  ImageEquations sum;             // of all images
+
+  // The median gain relative to that of independent errors of the same variance. `decreases` must not be empty.
+  double correlation() const {
+    const double variance = sum.squared_errors / (2.0 * sum.observations);
+    return median(decreases) / (kMedianChi2SixDof * variance);
+  }
+};
+
+ChangesBetweenImages changes_of(std::size_t camera, std::size_t cameras, const std::vector<std::size_t>& poses,
+                                const std::vector<ImageEquations>& equations) {
+  ChangesBetweenImages out;
+  const ImageEquations* previous = nullptr;
+  for (const std::size_t pose : poses) {
+    const ImageEquations& image = equations[pose * cameras + camera];
+    if (!image.enough()) continue;
+    out.sum.add(image);
+    if (previous != nullptr) {
+      ImageEquations both = *previous;
+      both.add(image);
+      const double decrease = best_change(both, image).second;
+      if (std::isfinite(decrease)) out.decreases.push_back(decrease);
+    }
+    previous = &image;
+  }
+  return out;
+}
+
 }  // namespace
 
 void ImageEquations::add(const ImageEquations& other) {
@@ -66,43 +97,6 @@ std::pair<Vector6d, double> best_change(const ImageEquations& all, const ImageEq
   return {change, b.dot(change)};
 }
 
-namespace {
-
-// What independent extrinsics of two successive images of a camera would gain, for all such images.
-struct ChangesBetweenImages {
-  std::vector<double> decreases;  // twice those of the cost
-  ImageEquations sum;             // of all images
-
-  // The median gain relative to that of independent errors of the same variance. `decreases` must not be empty.
-  double correlation() {
-    const auto middle = decreases.begin() + static_cast<std::ptrdiff_t>(decreases.size() / 2);
-    std::ranges::nth_element(decreases, middle);
-    const double variance = sum.squared_errors / (2.0 * sum.observations);
-    return *middle / (kMedianChi2SixDof * variance);
-  }
-};
-
-ChangesBetweenImages changes_of(std::size_t camera, std::size_t cameras, const std::vector<std::size_t>& poses,
-                                const std::vector<ImageEquations>& equations) {
-  ChangesBetweenImages out;
-  const ImageEquations* previous = nullptr;
-  for (const std::size_t pose : poses) {
-    const ImageEquations& image = equations[pose * cameras + camera];
-    if (!image.enough()) continue;
-    out.sum.add(image);
-    if (previous != nullptr) {
-      ImageEquations both = *previous;
-      both.add(image);
-      const double decrease = best_change(both, image).second;
-      if (std::isfinite(decrease)) out.decreases.push_back(decrease);
-    }
-    previous = &image;
-  }
-  return out;
-}
-
-}  // namespace
-
 double correlation_in_images(const map::BundledMap& map, const RigProblem& problem, const solver::RigValues& values) {
   const std::vector<std::size_t> poses = poses_by_time(map, problem);
   const std::vector<ImageEquations> equations = image_equations(problem, values);
@@ -124,7 +118,7 @@ std::optional<std::size_t> unsteady_camera(const map::BundledMap& map, const Rig
   const std::size_t cameras = values.T_cam_rig.size();
   std::vector<std::pair<std::size_t, double>> found;  // cameras and their correlations
   for (std::size_t c = 0; c < cameras; ++c) {
-    ChangesBetweenImages changes = changes_of(c, cameras, poses, equations);
+    const ChangesBetweenImages changes = changes_of(c, cameras, poses, equations);
     if (changes.decreases.size() >= kMinPairsOfCamera && changes.sum.squared_errors > 0)
       found.emplace_back(c, changes.correlation());
   }

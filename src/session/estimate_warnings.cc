@@ -27,10 +27,14 @@ bool has_wrong_times(const CalibrationRecord& calibration, std::size_t camera) {
   return is_late(calibration, camera) || (calibration.estimate.jump && calibration.estimate.jump->camera == camera);
 }
 
+// Returns true if no calibration of a camera explains its images, for a reason that is known.
+bool has_other_cause(const CalibrationRecord& calibration, std::size_t camera) {
+  return has_wrong_times(calibration, camera) || calibration.estimate.unsteady == camera;
+}
+
 // Returns true if what is said about a camera explains what looks like wrong extrinsics of it.
 bool is_explained(const CalibrationRecord& calibration, std::size_t camera) {
-  return has_wrong_times(calibration, camera) || calibration.estimate.unsteady == camera ||
-         std::ranges::count(calibration.unexplained, camera) > 0;
+  return has_other_cause(calibration, camera) || std::ranges::count(calibration.unexplained, camera) > 0;
 }
 
 // Warns of cameras that were moved during the run. Of two cameras, it is not known which one was moved. What looks like
@@ -66,9 +70,7 @@ void warn_of_unsteady(const RunRecord& record, Warnings& warnings) {
 void warn_of_unexplained(const RunRecord& record, Warnings& warnings) {
   const CalibrationRecord& calibration = record.calibration;
   for (const std::size_t c : calibration.unexplained) {
-    if (has_wrong_times(calibration, c) || calibration.estimate.unsteady == c ||
-        std::ranges::count(calibration.disagreeing, c) > 0)
-      continue;
+    if (has_other_cause(calibration, c) || std::ranges::count(calibration.disagreeing, c) > 0) continue;
     warn(warnings,
          "{}: its reprojection error of {:.2f} px is more than twice that of the other cameras, and fewer of its "
          "matches are inliers ({:.0f} %): its intrinsics, its extrinsics or its time stamps are wrong, or it is out of "
