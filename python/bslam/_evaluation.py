@@ -73,7 +73,9 @@ def evaluate(
         align: alignment of the estimate: a rigid transform, a similarity, or none.
         max_dt: maximum time difference in seconds between a pose and its ground truth.
         delta: time in seconds between the two poses of a relative error.
-        gt_frame: frame of the ground truth poses; body needs `rig`, unless `est` is a file with poses of the body.
+            An array has no names of frames: without `camera` it is taken for poses of camera 0.
+        gt_frame: frame of the ground truth poses; body needs `rig`, unless `est` is a file with poses of the body. To
+            compare an array of poses of the body with ground truth of the body, leave out both.
         rig: calibration with the poses of the cameras on the body. With ground truth of cam0, poses of another camera
             are compared with it by the rig.
         camera: camera of the rig whose poses are estimated; default: the one that the first line of the file `est`

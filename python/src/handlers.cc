@@ -15,7 +15,7 @@ void Handlers::call(const nb::object& function, Arguments&&... arguments) {
   try {
     function(std::forward<Arguments>(arguments)...);
   } catch (nb::python_error&) {
-    if (!raised_) raised_ = std::current_exception();
+    raised_.try_emplace(std::this_thread::get_id(), std::current_exception());
   }
 }
 
@@ -33,7 +33,7 @@ Callbacks Handlers::callbacks() {
 }
 
 void Handlers::rethrow() {
-  if (raised_) std::rethrow_exception(std::exchange(raised_, nullptr));
+  if (auto raised = raised_.extract(std::this_thread::get_id())) std::rethrow_exception(raised.mapped());
 }
 
 void bind_events(nb::module_& module) {

@@ -6,6 +6,8 @@
 
 #include <array>
 #include <exception>
+#include <map>
+#include <thread>
 #include <utility>
 
 namespace bslam::python {
@@ -19,7 +21,7 @@ class Handlers {
 
   // Functions for System::create(); each acquires the GIL.
   Callbacks callbacks();
-  // Throws the first exception that one of the functions has raised since the last call.
+  // Throws the first exception that one of the functions has raised in this thread since the last call.
   void rethrow();
   // All references to Python objects, for the garbage collector.
   std::array<nanobind::object*, 4> references() { return {&keyframe, &loop, &camera, &log}; }
@@ -28,7 +30,7 @@ class Handlers {
   template <class... Arguments>
   void call(const nanobind::object& function, Arguments&&... arguments);
 
-  std::exception_ptr raised_;
+  std::map<std::thread::id, std::exception_ptr> raised_;  // the first one of each thread
 };
 
 void bind_events(nanobind::module_& module);

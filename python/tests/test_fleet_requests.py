@@ -12,7 +12,8 @@ import pytest
 
 pytest.importorskip("distributed", reason="distributed is not installed: the fleet is not tested")
 
-from bslam.fleet import _interruption, map_recordings
+from bslam.fleet import _interruption, _tasks, map_recordings
+from bslam.fleet.__main__ import main
 from bslam.fleet._cache import content_of
 from bslam.fleet._files import shared_rig
 from bslam.fleet._site import _named
@@ -57,6 +58,19 @@ def test_interruption_is_noted_and_a_second_one_is_immediate():
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
     with _interruption.noted():
         _interruption.raise_if_noted()  # an earlier one is forgotten
+
+
+@pytest.mark.parametrize("interrupted", [False, True])
+def test_program_that_is_killed_before_the_tasks_is_one_line(recording, tmp_path, monkeypatch, capsys, interrupted):
+    program = tmp_path / "bslam"
+    program.write_text("#!/bin/sh\n" + ("kill -2 $PPID; sleep 0.1; " if interrupted else "") + "kill -9 $$\n")
+    program.chmod(0o755)
+    monkeypatch.setattr(_tasks, "PROGRAM", program)
+    arguments = ["bslam fleet", "map", str(recording.folder), "--out", str(tmp_path / "site"), "--rig", str(RIG)]
+    monkeypatch.setattr(sys, "argv", arguments)
+    assert main() == (130 if interrupted else 1)
+    line = "interrupted" if interrupted else "bslam rig was ended by signal 9"
+    assert capsys.readouterr().err == f"bslam: {line}; the same command continues\n"
 
 
 def test_no_maps_have_no_likely_pairs():

@@ -173,17 +173,22 @@ void SlamRunner::keep_trajectory(const bslam::System& before) {
 void SlamRunner::process(const bslam::ImageBundle& images) {
   const auto frame = system_->process(images);  // only this thread replaces system_
   std::optional<bslam::FrameResult> before;
+  const std::string failure = frame ? "" : frame.error().message();
+  bool is_new = false;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     last_frame_at_ = Clock::now();
-    failure_ = frame ? "" : frame.error().message();
+    is_new = std::exchange(failure_, failure) != failure;
     if (frame) {
       before = std::exchange(last_, *frame);
       ++frames_;
       if (!frame->tracking()) ++lost_;
     }
   }
-  if (!frame) return log(bslam::LogLevel::kWarning, frame.error().message());
+  if (!frame) {
+    if (is_new) log(bslam::LogLevel::kWarning, failure);
+    return;
+  }
   if (frame->tracking() && outputs_.pose) outputs_.pose(converter_.convert(*frame));
   report_changes(before, *frame);
   if (map_changed_.exchange(false)) cloud_due_ = true;
@@ -280,8 +285,9 @@ bslam::Status SlamRunner::set_localize_only(bool on) {
 bslam::Status SlamRunner::replace_system(const std::string& map, bool localize_only) {
   auto system = make_system(map, localize_only);
   if (!system) return system.error();
+  std::shared_ptr<bslam::System> unused;  // destroyed without the lock: its threads have to end first
   const std::lock_guard<std::mutex> lock(mutex_);
-  next_system_ = *std::move(system);
+  unused = std::exchange(next_system_, *std::move(system));
   next_localize_only_ = localize_only;
   return {};
 }

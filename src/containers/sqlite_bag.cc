@@ -43,7 +43,7 @@ std::string text(sqlite3_stmt* row, int column) {
 
 // Escapes a file name for use in a URI.
 std::string uri_of(const std::filesystem::path& path) {
-  std::string uri = "file:";
+  std::string uri = path.is_absolute() ? "file://" : "file:";  // else `//` would begin the name of a server
   for (const unsigned char c : path.string())
     uri +=
         (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '/' || c == '.' || c == '-'

@@ -10,6 +10,8 @@
 #include <system_error>
 #include <utility>
 
+#include "base/cores.h"
+#include "base/thread_pool.h"
 #include "dataset/camera_choice.h"
 #include "dataset/frame_grouping.h"
 #include "dataset/image_checks.h"
@@ -35,17 +37,31 @@ std::string name_of(const fs::path& path) {
   return fs::is_directory(whole, error) ? whole.filename().string() : whole.stem().string();
 }
 
+// The result of check_images() for each camera whose images are listed. It decodes an image, so that the cameras are
+// divided among threads.
+std::vector<Status> check_all(const std::vector<Result<image_files::ImageList>>& lists, const camera::Rig& rig) {
+  std::vector<Status> out(lists.size());
+  ThreadPool pool(std::clamp(static_cast<int>(lists.size()), 1, processor_cores()));
+  pool.for_each(lists.size(), [&](std::size_t i) {
+    if (lists[i]) out[i] = check_images(lists[i]->images, rig.camera(i));
+  });
+  return out;
+}
+
 // Returns the images of every camera in use, with time offsets applied to the time stamps.
 Result<std::vector<std::vector<image_files::ImageFile>>> collect_images(const DatasetRequest& request,
                                                                         const Recording& recording, ChosenRig& chosen) {
   std::vector<std::vector<image_files::ImageFile>> images;
+  std::vector<Result<image_files::ImageList>> lists;
+  for (const int camera : chosen.recorded) lists.push_back(recording.images(static_cast<std::size_t>(camera)));
+  const std::vector<Status> checks = check_all(lists, chosen.rig);
   for (std::size_t i = 0; i < chosen.cameras.size(); ++i) {
-    auto list = recording.images(static_cast<std::size_t>(chosen.recorded[i]));
+    auto& list = lists[i];
     if (!list) return list.error();
     if (auto absent = absent_warning(list->images)) list->warnings.push_back(*std::move(absent));
     for (const std::string& warning : list->warnings) add_once(warning, chosen.warnings);
     const camera::Camera& camera = chosen.rig.camera(i);
-    if (const Status status = check_images(list->images, camera); !status) return status.error();
+    if (!checks[i]) return checks[i].error();
     if (const auto mask = image_decoding::read_mask(camera); !mask) return mask.error();
     const std::string source = image_files::source_of(list->images.front());
     if (const Status s = convert_time_stamps(request.time_stamps, source, list->images); !s) return s.error();

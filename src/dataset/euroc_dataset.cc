@@ -2,9 +2,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <map>
-#include <set>
+#include <string>
 #include <string_view>
+#include <unordered_map>
+#include <unordered_set>
 #include <utility>
 
 #include "base/atomic_file.h"
@@ -68,13 +69,17 @@ Result<std::vector<image_files::ImageFile>> parse_list(const fs::path& file, std
 
 // Images that were converted to another format after the list was written have the same names but for their extensions.
 void find_converted(const std::vector<fs::path>& present, std::vector<image_files::ImageFile>& images) {
-  const std::set<fs::path> files(present.begin(), present.end());
-  std::map<fs::path, fs::path> by_stem;
-  for (const fs::path& file : present) by_stem.try_emplace(file.parent_path() / file.stem(), file);
+  std::unordered_set<std::string_view> files;
+  for (const fs::path& file : present) files.insert(file.native());
+  const auto is_there = [&](const image_files::ImageFile& image) { return files.contains(image.path.native()); };
+  if (std::ranges::all_of(images, is_there)) return;
+  std::unordered_map<std::string, const fs::path*> by_stem;
+  const auto stem_of = [](const fs::path& file) { return (file.parent_path() / file.stem()).string(); };
+  for (const fs::path& file : present) by_stem.try_emplace(stem_of(file), &file);
   for (image_files::ImageFile& image : images) {
-    if (files.contains(image.path)) continue;
-    const auto converted = by_stem.find(image.path.parent_path() / image.path.stem());
-    if (converted != by_stem.end()) image.path = converted->second;
+    if (is_there(image)) continue;
+    const auto converted = by_stem.find(stem_of(image.path));
+    if (converted != by_stem.end()) image.path = *converted->second;
   }
 }
 

@@ -5,10 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <map>
 #include <optional>
-#include <set>
+#include <string>
 #include <system_error>
+#include <unordered_map>
+#include <unordered_set>
 
 #include "image_decoding/image_file.h"
 
@@ -93,22 +94,23 @@ bool have_same_images(FirstImages& a, FirstImages& b) {
 class FolderContents {
  public:
   bool has(const std::filesystem::path& file) {
-    const std::filesystem::path folder = file.parent_path();
-    const auto [found, is_new] = names_.try_emplace(folder);
-    if (is_new) found->second = names_in(folder);
-    return found->second.contains(file.filename().string());
+    const std::string& name = file.native();
+    const std::size_t begin = name.rfind('/') + 1;  // 0 if there is no folder
+    const auto [found, is_new] = names_.try_emplace(name.substr(0, begin));
+    if (is_new) found->second = names_in(file.parent_path());
+    return found->second.contains(name.substr(begin));
   }
 
  private:
-  static std::set<std::string> names_in(const std::filesystem::path& folder) {
-    std::set<std::string> names;
+  static std::unordered_set<std::string> names_in(const std::filesystem::path& folder) {
+    std::unordered_set<std::string> names;
     std::error_code error;
     for (std::filesystem::directory_iterator it(folder, error), end; !error && it != end; it.increment(error))
       names.insert(it->path().filename().string());
     return names;
   }
 
-  std::map<std::filesystem::path, std::set<std::string>> names_;
+  std::unordered_map<std::string, std::unordered_set<std::string>> names_;
 };
 
 }  // namespace

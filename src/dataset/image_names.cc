@@ -227,7 +227,7 @@ std::vector<fs::path> image_files_of(const fs::path& folder) {
     if (image_files::is_image_name(it->path()) && !it->path().filename().string().starts_with('.'))
       files.push_back(it->path());
   }
-  std::ranges::sort(files);
+  std::ranges::sort(files, {}, [](const fs::path& file) -> const std::string& { return file.native(); });
   return files;
 }
 

@@ -87,10 +87,16 @@ double test_correlation(const BinaryTest& a, const BinaryTest& b) {
   return model.covariance(a, b) / std::sqrt(static_cast<double>(model.covariance(a, a)) * model.covariance(b, b));
 }
 
-Describer::Describer() : rotated_(kRotations) {
+const Describer::Rotated& Describer::rotated_tests() {
+  static const Rotated tests = rotate_tests();
+  return tests;
+}
+
+Describer::Rotated Describer::rotate_tests() {
+  Rotated rotated;
   const std::array<BinaryTest, kTestCount> tests = make_brief_pattern();
-  for (int r = 0; r < kRotations; ++r) {
-    const double angle = 2 * std::numbers::pi * r / kRotations;
+  for (std::size_t r = 0; r < rotated.size(); ++r) {
+    const double angle = 2 * std::numbers::pi * static_cast<double>(r) / kRotations;
     const double c = std::cos(angle), s = std::sin(angle);
     const auto offset = [&](int x, int y) {
       const int column = static_cast<int>(std::lround(c * x - s * y)) + kWindowRadius;
@@ -98,9 +104,10 @@ Describer::Describer() : rotated_(kRotations) {
       return static_cast<std::uint16_t>(row * kWindowStride + column);
     };
     for (std::size_t t = 0; t < tests.size(); ++t) {
-      rotated_[r][t] = {offset(tests[t].x1, tests[t].y1), offset(tests[t].x2, tests[t].y2)};
+      rotated[r][t] = {offset(tests[t].x1, tests[t].y1), offset(tests[t].x2, tests[t].y2)};
     }
   }
+  return rotated;
 }
 
 Descriptor Describer::describe(const Window& window, float angle) const {

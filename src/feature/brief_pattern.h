@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cstdint>
-#include <vector>
 
 #include "feature/keypoints.h"
 #include "feature/window.h"
@@ -28,10 +27,10 @@ std::array<BinaryTest, kTestCount> make_brief_pattern();
 // Correlation of two tests under that model, in [-1, 1].
 double test_correlation(const BinaryTest& a, const BinaryTest& b);
 
-// Describes keypoints; holds the tests in kRotations orientations.
+// Describes keypoints. All describers share the tests in kRotations orientations, which the first one computes.
 class Describer {
  public:
-  Describer();
+  Describer() : rotated_(rotated_tests()) {}
 
   // `window`: of the smoothed level. `angle`: radians.
   Descriptor describe(const Window& window, float angle) const;
@@ -44,7 +43,11 @@ class Describer {
   struct Offsets {
     std::uint16_t first, second;  // indices into a Window
   };
-  std::vector<std::array<Offsets, kTestCount>> rotated_;
+  using Rotated = std::array<std::array<Offsets, kTestCount>, kRotations>;
+  static Rotated rotate_tests();
+  static const Rotated& rotated_tests();  // computed by the first call
+
+  const Rotated& rotated_;
 };
 
 }  // namespace bslam::feature

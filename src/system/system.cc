@@ -148,7 +148,7 @@ void System::mark_created_keyframes() {
 
 // Drops the oldest records once there are twice as many as configured, so that the mean time per frame is constant.
 void System::bound_history() {
-  if (history_ == 0 || frames_.size() < 2 * history_) return;
+  if (history_ == 0 || frames_.size() / 2 < history_) return;
   if (records_.creates_keyframes() && !executor_->over()) return;  // their frames will be marked
   frames_.erase(frames_.begin(), frames_.end() - static_cast<std::ptrdiff_t>(history_));
   std::erase_if(early_, [&](const auto& early) { return early.frame->id < frames_.front().result.frame; });

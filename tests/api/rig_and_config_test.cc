@@ -139,6 +139,20 @@ TEST(PublicRig, SavesItsMasks) {
   EXPECT_FALSE(rig.save(folder.path() / "other.yaml"));
 }
 
+TEST(PublicRig, SaysThatItReadsNoMaskInsideOfARecording) {
+  const TemporaryFolder folder;
+  support::write_text(folder.path() / "walk.mcap", "recording");
+  const auto file = folder.path() / "robot.yaml";
+  ASSERT_TRUE(Rig::make({TexturedWall::calibration(0)}).value().save(file));
+  std::string text = support::read_text(file);
+  const std::size_t at = text.find("mask: ") + 6;
+  text.replace(at, text.find('\n', at) - at, "walk.mcap/masks/cam0.png");
+  support::write_text(file, text);
+  const auto rig = Rig::load(file);
+  ASSERT_FALSE(rig);
+  EXPECT_NE(rig.error().found.find("inside of the recording"), std::string::npos) << rig.error().message();
+}
+
 TEST(PublicConfig, SetsByNameAndRejectsInvalidValues) {
   Config config;
   EXPECT_TRUE(config.set("features.per_image", "777"));

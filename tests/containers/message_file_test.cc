@@ -271,6 +271,15 @@ TEST(MessageFile, ASqliteMessageCannotBeLargerThanItsFile) {
   }
 }
 
+// As scripts name files that join a folder with a slash at its end.
+TEST(MessageFile, AnSqliteBagMayBeNamedWithTwoSlashes) {
+  const support::TemporaryFolder folder;
+  support::write_sqlite_bag(folder.path() / "a.db3", test_messages(Wire::kCdr));
+  const auto file = open_message_file("/" + (folder.path() / "a.db3").string());
+  ASSERT_TRUE(file) << file.error().message();
+  EXPECT_FALSE((*file)->messages().empty());
+}
+
 TEST(MessageFile, NothingIsWrittenBesideAnSqliteBagWithALog) {
   const support::TemporaryFolder folder;
   const fs::path recorded = folder.path() / "recorded", copy = folder.path() / "copy";

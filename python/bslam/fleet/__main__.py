@@ -49,6 +49,9 @@ def main() -> int:
     except Error as error:
         print(f"bslam: {error}", file=sys.stderr)
         return 2
+    except _interruption.ProgramKilledError as error:
+        print(f"bslam: {error}; the same command continues", file=sys.stderr)
+        return 1
     except KeyboardInterrupt:
         print("bslam: interrupted; the same command continues", file=sys.stderr)
         return 130

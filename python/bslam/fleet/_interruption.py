@@ -12,6 +12,10 @@ from typing import Any
 _noted = False
 
 
+class ProgramKilledError(RuntimeError):
+    """A signal has ended the program, for example because there was not enough memory."""
+
+
 @contextlib.contextmanager
 def noted() -> Iterator[None]:
     """Ctrl-C only notes that it was pressed, for `raise_if_noted`; pressed again, it raises KeyboardInterrupt at once.

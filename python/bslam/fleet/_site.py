@@ -241,7 +241,7 @@ class _Mapping:
             raise _bslam.Error(
                 f"the scheduler or its workers were lost; the same command continues ({type(error).__name__})"
             ) from error
-        except (*_NOT_WRITTEN, _tasks.ProgramKilledError) as error:
+        except (*_NOT_WRITTEN, _interruption.ProgramKilledError) as error:
             raise _bslam.Error(f"{label}: {reason_of(error)}; the same command continues") from error
         except (ImportError, RuntimeError) as error:
             if isinstance(error, RuntimeError) and "deserializ" not in str(error):

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import _bslam
+from . import _interruption
 from .._program import PROGRAM
 from ._cache import (
     FILES_ABOVE,
@@ -39,10 +40,6 @@ _NOTHING_TRACKED, _WRONG_INPUT = 3, 2  # exit status
 _CANNOT_WRITE = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)  # errors that reading never has
 _PACKAGE = (pathlib.Path(_bslam.__file__), *sorted(pathlib.Path(__file__).parent.glob("*.py")))
 _LOADED = key_of([sha256_of(file) for file in _PACKAGE])  # what this process runs, also if the files are replaced
-
-
-class ProgramKilledError(RuntimeError):
-    """A signal has ended the program, for example because there was not enough memory."""
 
 
 class RefusedError(_bslam.Error):
@@ -326,8 +323,9 @@ def _run(*arguments: str) -> subprocess.CompletedProcess[str]:
         check=False,
         preexec_fn=_end_together,
     )
-    if done.returncode < 0:  # Dask tries again
-        raise ProgramKilledError(f"bslam {arguments[0]} was ended by signal {-done.returncode}")
+    if done.returncode < 0:  # Dask tries again, unless the whole call was interrupted
+        _interruption.raise_if_noted()
+        raise _interruption.ProgramKilledError(f"bslam {arguments[0]} was ended by signal {-done.returncode}")
     return done
 
 
