@@ -41,6 +41,9 @@ class FrameBuilder {
   std::span<const image::Pyramid> pyramids() const { return pyramids_; }
   std::span<const image::ImageView> masks() const { return current_masks_; }
 
+  // The masks of the cameras, without those of single images.
+  std::span<const image::Image> camera_masks() const { return masks_; }
+
   // Moves the images of the frame that was begun last to another builder, which can extract its keypoints later. After
   // release() this one has none until the next frame begins.
   ReleasedImages release();

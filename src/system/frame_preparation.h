@@ -36,6 +36,7 @@ class FramePreparation {
   // The images of the frame that was begun last. release() moves them out.
   tracking::FrameImages images() const { return {builder_.pyramids(), builder_.masks()}; }
   matching::ReleasedImages release() { return builder_.release(); }
+  std::span<const image::Image> camera_masks() const { return builder_.camera_masks(); }
   // See matching::FrameBuilder.
   void free_scratch_memory() { builder_.free_scratch_memory(); }
   std::size_t memory_bytes() const { return builder_.memory_bytes(); }

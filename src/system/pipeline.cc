@@ -32,7 +32,7 @@ Pipeline::Pipeline(const camera::Rig& rig, CamerasOfRun cameras, const Config& c
 Pipeline::Outcome Pipeline::process(const image::ImageBundle& images, execution::StageExecutor& executor) {
   const Stopwatch whole;
   Outcome outcome;
-  tracking::ImageFaults faults = monitor_.examine(images, pool_);
+  tracking::ImageFaults faults = monitor_.examine(images, preparation_.camera_masks(), pool_);
   const tracking::FramePlan plan = tracker_.plan(images, faults, state_);
 
   std::vector<StageTime> stages;

@@ -41,15 +41,30 @@ std::uint64_t content(const image::ImageView& image) {
   return rest;
 }
 
+// The masks of an image; either may be empty.
+struct Masks {
+  image::ImageView of_camera, of_image;
+
+  bool any() const { return !of_camera.empty() || !of_image.empty(); }
+  bool ignore(int x, int y) const {
+    return (!of_camera.empty() && of_camera.row(y)[x] == 0) || (!of_image.empty() && of_image.row(y)[x] == 0);
+  }
+};
+
 // Completes `health` except for its content and blur.
-void measure_exposure(const image::ImageView& image, const HealthOptions& options, ImageHealth& health) {
+void measure_exposure(const image::ImageView& image, const Masks& masks, const HealthOptions& options,
+                      ImageHealth& health) {
   int samples = 0, dark = 0, bright = 0;
+  const bool masked = masks.any();
   for (int y = 0; y < image.height; y += kSampleStep) {
-    for (int x = 0; x < image.width; x += kSampleStep, ++samples) {
+    for (int x = 0; x < image.width; x += kSampleStep) {
+      if (masked && masks.ignore(x, y)) continue;
+      ++samples;
       dark += image.row(y)[x] <= options.dark_level;
       bright += image.row(y)[x] >= options.bright_level;
     }
   }
+  if (samples == 0) return;
   health.shows_something = dark + bright < options.black_pixel_ratio * samples;
   if (dark >= options.black_pixel_ratio * samples) {
     health.reason = CameraReason::kBlack;
@@ -63,10 +78,13 @@ struct Edges {
 };
 
 // Divides a line of `pixels` pixels, which begins at `first` and has a distance of `step` bytes between pixels, into
-// spans, and counts the spans that contain an edge and those whose edge is sharp.
-void count_edges(const std::uint8_t* first, std::ptrdiff_t step, int pixels, double sharp_slope, Edges& edges) {
+// spans, and counts the spans that contain an edge and those whose edge is sharp. `ignore(i)`: pixel i is masked.
+template <class Ignore>
+void count_edges(const std::uint8_t* first, std::ptrdiff_t step, int pixels, double sharp_slope, const Ignore& ignore,
+                 Edges& edges) {
   constexpr int kSpan = 16, kContrast = 40;  // pixels; grey values
   for (int begin = 0; begin + kSpan < pixels; begin += kSpan) {
+    if (ignore(begin) || ignore(begin + kSpan)) continue;
     const std::uint8_t* p = first + begin * step;
     int low = *p, high = *p, steepest = 0;
     for (int i = 1; i <= kSpan; ++i) {
@@ -82,20 +100,26 @@ void count_edges(const std::uint8_t* first, std::ptrdiff_t step, int pixels, dou
 }
 
 // Returns nullopt if there are too few edges.
-std::optional<bool> is_blurred(const image::ImageView& image, const HealthOptions& options) {
+std::optional<bool> is_blurred(const image::ImageView& image, const Masks& masks, const HealthOptions& options) {
   constexpr int kLines = 30, kMinEdges = 40;  // number of rows searched; columns have the same spacing
   const int step = std::max(1, image.height / kLines);
   Edges edges;
-  for (int y = 0; y < image.height; y += step) count_edges(image.row(y), 1, image.width, options.sharp_slope, edges);
-  for (int x = 0; x < image.width; x += step)
-    count_edges(image.row(0) + x, image.stride, image.height, options.sharp_slope, edges);
+  const bool masked = masks.any();
+  for (int y = 0; y < image.height; y += step) {
+    const auto ignore = [&](int x) { return masked && masks.ignore(x, y); };
+    count_edges(image.row(y), 1, image.width, options.sharp_slope, ignore, edges);
+  }
+  for (int x = 0; x < image.width; x += step) {
+    const auto ignore = [&](int y) { return masked && masks.ignore(x, y); };
+    count_edges(image.row(0) + x, image.stride, image.height, options.sharp_slope, ignore, edges);
+  }
   if (edges.all < kMinEdges) return std::nullopt;
   return edges.sharp < options.min_sharp_edge_ratio * edges.all;
 }
 
-ImageHealth image_health(const image::ImageView& image, const HealthOptions& options) {
-  ImageHealth out{.content = content(image), .blurred = is_blurred(image, options)};
-  measure_exposure(image, options, out);
+ImageHealth image_health(const image::ImageView& image, const Masks& masks, const HealthOptions& options) {
+  ImageHealth out{.content = content(image), .blurred = is_blurred(image, masks, options)};
+  measure_exposure(image, masks, options, out);
   out.blocks = block_means(image);
   return out;
 }
@@ -105,12 +129,16 @@ ImageHealth image_health(const image::ImageView& image, const HealthOptions& opt
 CameraMonitor::CameraMonitor(std::size_t cameras, const HealthOptions& options)
     : options_(options), cameras_(cameras), still_views_(cameras) {}
 
-ImageFaults CameraMonitor::examine(const image::ImageBundle& images, ThreadPool& pool) {
+ImageFaults CameraMonitor::examine(const image::ImageBundle& images, std::span<const image::Image> masks,
+                                   ThreadPool& pool) {
   BSLAM_ASSERT(images.images.size() == cameras_.size(), "there must be one image entry per camera");
+  BSLAM_ASSERT(masks.empty() || masks.size() == cameras_.size(), "there must be one mask entry per camera");
   Health health(cameras_.size());
   pool.for_each(cameras_.size(), [&](std::size_t c) {
     const image::CameraImage& input = images.images[c];
-    if (input.state == image::ImageState::kPresent) health[c] = image_health(input.view(), options_);
+    if (input.state != image::ImageState::kPresent) return;
+    const Masks of_image{masks.empty() ? image::ImageView() : masks[c].view(), input.mask_view()};
+    health[c] = image_health(input.view(), of_image, options_);
   });
   ImageFaults faults;
   faults.outage = find_outages(health, images.time_ns, faults.repeated);

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "base/options.h"
@@ -64,8 +65,10 @@ class CameraMonitor {
  public:
   CameraMonitor(std::size_t cameras, const HealthOptions& options);
 
-  // Checks the images of the next frame. `images`: one per camera. The threads of `pool` share them.
-  ImageFaults examine(const image::ImageBundle& images, ThreadPool& pool);
+  // Checks the images of the next frame. `images`: one per camera; exposure and blur are those of the pixels that
+  // neither the mask of an image nor that of its camera ignores. `masks`: one per camera, empty without a mask, or no
+  // masks at all. The threads of `pool` share the images.
+  ImageFaults examine(const image::ImageBundle& images, std::span<const image::Image> masks, ThreadPool& pool);
 
  private:
   using Health = std::vector<std::optional<ImageHealth>>;  // per camera; nullopt: it has no image

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "base/random.h"
@@ -37,7 +39,7 @@ image::ImageBundle frame(std::vector<image::Image> images) {
 
 ImageFaults examine(CameraMonitor& monitor, std::vector<image::Image> images) {
   ThreadPool pool(2);
-  return monitor.examine(frame(std::move(images)), pool);
+  return monitor.examine(frame(std::move(images)), {}, pool);
 }
 
 using Outages = std::vector<CameraReason>;
@@ -57,6 +59,27 @@ TEST(CameraMonitor, DistinguishesBlackOverExposedAndMissingImages) {
   CameraMonitor monitor(3, {});
   EXPECT_EQ(outages(monitor, {textured_image(1, 0, 12), textured_image(2, 251, 255), {}}),
             (Outages{CameraReason::kBlack, CameraReason::kOverExposed, CameraReason::kNoImages}));
+}
+
+// The white body of a robot covers most of the view. Without a mask the camera is over-exposed.
+TEST(CameraMonitor, DoesNotLookAtMaskedPixels) {
+  constexpr int kBody = kHeight * 3 / 4;
+  const auto view = [](std::uint64_t seed) {
+    image::Image out = good(seed);
+    for (int y = 0; y < kBody; ++y) std::fill_n(out.row(y), kWidth, std::uint8_t{255});
+    return out;
+  };
+  image::Image mask(kWidth, kHeight);
+  for (int y = 0; y < kHeight; ++y) std::fill_n(mask.row(y), kWidth, static_cast<std::uint8_t>(y < kBody ? 0 : 255));
+  ThreadPool pool(1);
+  const std::array<image::Image, 2> of_cameras = {mask, image::Image()};
+  CameraMonitor monitor(2, {});
+  image::ImageBundle bundle = frame({view(1), view(2)});
+  const auto expected = Outages{CameraReason::kNone, CameraReason::kOverExposed};
+  EXPECT_EQ(monitor.examine(bundle, of_cameras, pool).outage, expected);
+  bundle.images[1].mask = mask;  // of this image alone
+  CameraMonitor another(2, {});
+  EXPECT_EQ(another.examine(bundle, of_cameras, pool).outage, (Outages{CameraReason::kNone, CameraReason::kNone}));
 }
 
 // A large white object covers the view of both cameras.
@@ -205,6 +228,23 @@ using Flags = std::vector<std::uint8_t>;
 TEST(CameraMonitor, DistinguishesBlurredImagesFromSharpAndMotionBlurredOnes) {
   CameraMonitor monitor(3, {});
   EXPECT_EQ(examine(monitor, {tiles(0.6, 0.6), tiles(4, 4), tiles(6, 0.6)}).blurred, (Flags{0, 1, 0}));
+}
+
+// Sharp edges of the robot itself do not tell whether the camera is in focus.
+TEST(CameraMonitor, DoesNotLookForEdgesInMaskedPixels) {
+  image::Image image = tiles(4, 4);
+  const image::Image sharp = tiles(0.6, 0.6);
+  image::Image mask(image.width(), image.height());
+  for (int y = 0; y < image.height(); ++y) {
+    const bool body = y < image.height() / 2;
+    std::fill_n(mask.row(y), image.width(), static_cast<std::uint8_t>(body ? 0 : 255));
+    if (body) std::copy_n(sharp.row(y), image.width(), image.row(y));
+  }
+  ThreadPool pool(1);
+  CameraMonitor monitor(1, {});
+  EXPECT_EQ(monitor.examine(frame({image}), {}, pool).blurred, Flags{0});
+  CameraMonitor masked(1, {});
+  EXPECT_EQ(masked.examine(frame({image}), std::span(&mask, 1), pool).blurred, Flags{1});
 }
 
 TEST(CameraMonitor, DetectsNoBlurInImagesWithoutEdges) {
