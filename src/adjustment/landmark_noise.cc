@@ -42,12 +42,12 @@ void apply_variances(std::span<const double> variances, solver::ReprojectionProb
 
 solver::BundleSummary adjust_with_variances(solver::ReprojectionProblem& problem, std::span<const double> variances,
                                             const solver::BundleOptions& options, std::span<const std::uint8_t> skip,
-                                            std::stop_token stop, ThreadPool* pool) {
+                                            std::stop_token stop) {
   std::vector<float> sigmas;
   sigmas.reserve(problem.observations.size());
   for (const auto& o : problem.observations) sigmas.push_back(o.sigma);
   apply_variances(variances, problem);
-  solver::BundleSummary summary = solver::adjust(problem, options, skip, std::move(stop), pool);
+  solver::BundleSummary summary = solver::adjust(problem, options, skip, std::move(stop));
   for (std::size_t i = 0; i < sigmas.size(); ++i) problem.observations[i].sigma = sigmas[i];
   return summary;
 }

@@ -31,6 +31,6 @@ void apply_variances(std::span<const double> variances, solver::ReprojectionProb
 // variance factor. The standard deviations are restored afterwards.
 solver::BundleSummary adjust_with_variances(solver::ReprojectionProblem& problem, std::span<const double> variances,
                                             const solver::BundleOptions& options, std::span<const std::uint8_t> skip,
-                                            std::stop_token stop, ThreadPool* pool = nullptr);
+                                            std::stop_token stop);
 
 }  // namespace bslam::adjustment

@@ -103,8 +103,7 @@ std::vector<std::pair<KeyframeId, double>> scale_changes(const map::BundledMap& 
 // The round without robust kernel, on the inliers, with a variance for each landmark. Returns the uncertainties
 // requested by the selection.
 PoseUncertainties adjust_inliers(const map::BundledMap& map, const Selection& selection,
-                                 const AdjustmentOptions& options, BundleProblem& selected, std::stop_token stop,
-                                 ThreadPool* pool) {
+                                 const AdjustmentOptions& options, BundleProblem& selected, std::stop_token stop) {
   const std::vector<double> chi2 = solver::squared_errors(selected.problem);
   const auto skip = solver::beyond(chi2, options.outlier_chi2);
   const auto variances = landmark_variances(selected.problem, chi2, skip);
@@ -117,7 +116,7 @@ PoseUncertainties adjust_inliers(const map::BundledMap& map, const Selection& se
                               .correlated_observations = options.correlated_observations};
   if (solve.rig_deviation && !selection.whole_map)  // the whole map is fixed by the roots, which have no effects
     solve.fixed_effects = fixed_effects(map, selected, solve.rig_deviation->cols());
-  const auto summary = adjust_with_variances(selected.problem, variances, solve, skip, std::move(stop), pool);
+  const auto summary = adjust_with_variances(selected.problem, variances, solve, skip, std::move(stop));
   PoseUncertainties out;
   if (!solve.rig_deviation && !solve.rig_prior) out = without_calibration(map);
   for (auto& entry :
@@ -129,7 +128,7 @@ PoseUncertainties adjust_inliers(const map::BundledMap& map, const Selection& se
 }  // namespace
 
 bool adjust_map(const Selection& selection, const AdjustmentOptions& options, const feature::FeatureModel& features,
-                map::MapDraft& draft, std::stop_token stop, ThreadPool* pool) {
+                map::MapDraft& draft, std::stop_token stop) {
   BundleProblem selected = build_problem(draft.map(), selection, features);
   const bool any_fixed = std::any_of(selected.problem.pose_free.begin(), selected.problem.pose_free.end(),
                                      [](std::uint8_t f) { return !f; });
@@ -137,12 +136,12 @@ bool adjust_map(const Selection& selection, const AdjustmentOptions& options, co
 
   const solver::BundleOptions solve{
       .iterations = options.robust_iterations, .relative_decrease = options.relative_decrease, .robust = true};
-  const auto robust = solver::adjust(selected.problem, solve, {}, stop, pool);
+  const auto robust = solver::adjust(selected.problem, solve, {}, stop);
   if (!robust.usable()) return false;
   std::vector<map::CaptureTime> times = correct_capture_times(draft.map(), selected);
   PoseUncertainties uncertainties;
   if (!stop.stop_requested() && options.final_iterations > 0)
-    uncertainties = adjust_inliers(draft.map(), selection, options, selected, stop, pool);
+    uncertainties = adjust_inliers(draft.map(), selection, options, selected, stop);
   const std::vector<ObservationSource> bad = outlier_observations(selected, options.outlier_chi2);
   map::SetPoses poses = adjusted_poses(draft.map(), selected);
   poses.correction = selection.whole_map;

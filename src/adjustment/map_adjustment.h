@@ -36,9 +36,8 @@ struct AdjustmentOptions {
 // Adjusts the free keyframes and the landmarks, using the observations of all cameras, in two rounds. Writes poses with
 // their uncertainties (adjustment/pose_uncertainty.h), positions and the removal of outlier observations to the draft.
 // `features` determines the standard deviation of a keypoint that is not aligned to its landmark's patch. Returns false
-// if there is nothing to adjust, or the solver failed; the draft is unchanged then. The result does not depend on the
-// number of threads in `pool`; null: one.
+// if there is nothing to adjust, or the solver failed; the draft is unchanged then.
 bool adjust_map(const Selection& selection, const AdjustmentOptions& options, const feature::FeatureModel& features,
-                map::MapDraft& draft, std::stop_token stop = {}, ThreadPool* pool = nullptr);
+                map::MapDraft& draft, std::stop_token stop = {});
 
 }  // namespace bslam::adjustment

@@ -285,15 +285,14 @@ bool repeats(const Round& round, const std::vector<std::uint8_t>& skip,
 // of the observations that the previous round did not use, and then those of this round.
 bool run_round(const solver::ReprojectionProblem& problem, const Round& round, const CalibrationBlocks& blocks,
                const solver::RigValues& calibrated, const RigAdjustmentOptions& options, const std::stop_token& stop,
-               ThreadPool* pool, std::vector<std::uint8_t>& skipped, solver::BundleState& state, RigAdjustment& out) {
+               std::vector<std::uint8_t>& skipped, solver::BundleState& state, RigAdjustment& out) {
   const auto chi2 = solver::squared_errors(problem, state.T_rig_world, state.points, state.rig);
   std::vector<std::uint8_t> skip = solver::beyond(chi2, round.max_chi2);
   if (repeats(round, skip, skipped)) return true;
   skipped = std::move(skip);
   const solver::BundleStructure structure = solver::make_structure(problem, chi2, skipped);
   if (structure.num_points() == 0) return false;
-  solver::BundleEquations equations(problem, structure, blocks.blocks, round.kernel, kDensePoses, std::move(state),
-                                    pool);
+  solver::BundleEquations equations(problem, structure, blocks.blocks, round.kernel, kDensePoses, std::move(state));
   const bool last = &round == &kRounds.back();
   const double decrease = last ? options.relative_decrease : std::max(kEarlyDecrease, options.relative_decrease);
   const solver::LmSummary summary =
@@ -323,7 +322,7 @@ Eigen::MatrixXd prior_information(const solver::RigValues& calibrated, const Rig
 }
 
 RigAdjustment adjust_rig(solver::ReprojectionProblem& problem, const RigAdjustmentOptions& options,
-                         std::optional<solver::RigValues> start, std::stop_token stop, ThreadPool* pool) {
+                         std::optional<solver::RigValues> start, std::stop_token stop) {
   BSLAM_ASSERT(problem.rig != nullptr, "the problem must have a rig");
   BSLAM_ASSERT(options.sigma_rotation > 0 && options.sigma_translation > 0, "standard deviations must be positive");
   RigAdjustment out;
@@ -349,7 +348,7 @@ RigAdjustment adjust_rig(solver::ReprojectionProblem& problem, const RigAdjustme
     if (flags != flagged) skipped.clear();  // with another prior, no round repeats the one before
     flagged = flags;
     blocks = make_blocks(calibrated, options, flagged);
-    if (!run_round(scaled, round, blocks, calibrated, options, stop, pool, skipped, state, out)) return out;
+    if (!run_round(scaled, round, blocks, calibrated, options, stop, skipped, state, out)) return out;
     if (options.sigma_scale > 0)
       out.scale_change *= restore_scale(extrinsic_prior(calibrated, options, 1.0, flagged), scaled, state);
   }

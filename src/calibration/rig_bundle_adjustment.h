@@ -95,9 +95,8 @@ Eigen::MatrixXd prior_information(const solver::RigValues& calibrated, const Rig
 // nullopt: the calibrated ones. At least one pose must be fixed in every component that is connected by points. Rounds:
 // with Huber kernel over all observations, then over those within a widened bound, then twice without kernel within the
 // 95 % bound. Each round classifies all observations again, so that observations rejected because of a wrong
-// calibration are used again. Bitwise deterministic, whatever the number of threads in `pool`; null: one.
+// calibration are used again. Bitwise deterministic.
 RigAdjustment adjust_rig(solver::ReprojectionProblem& problem, const RigAdjustmentOptions& options = {},
-                         std::optional<solver::RigValues> start = {}, std::stop_token stop = {},
-                         ThreadPool* pool = nullptr);
+                         std::optional<solver::RigValues> start = {}, std::stop_token stop = {});
 
 }  // namespace bslam::calibration

@@ -31,14 +31,14 @@ bool converged(const RigAdjustment& adjusted, const solver::RigValues& before) {
 }
 
 // Adjusts again with the variance of each landmark (adjustment/landmark_noise.h), from the estimate `from`.
-RigAdjustment adjust_weighted(const EstimateInput& input, RigAdjustmentOptions options, RigAdjustment from,
-                              RigProblem& problem) {
+RigAdjustment adjust_weighted(RigAdjustmentOptions options, RigAdjustment from, RigProblem& problem,
+                              const std::stop_token& stop) {
   solver::ReprojectionProblem& selected = problem.selected.problem;
   const auto chi2 = solver::squared_errors(selected, selected.T_rig_world, selected.points, from.values);
   adjustment::apply_variances(
       adjustment::landmark_variances(selected, chi2, solver::beyond(chi2, solver::kChi2TwoDof95)), selected);
   options.start_is_estimate = true;
-  RigAdjustment out = adjust_rig(selected, options, from.values, input.stop, input.pool);
+  RigAdjustment out = adjust_rig(selected, options, from.values, stop);
   if (!out.done) return from;
   out.scale_change *= from.scale_change;
   return out;
@@ -68,13 +68,13 @@ int recover(const EstimateInput& input, const MovedCameras& cameras, const solve
 RigAdjustment adjust_correlated(const EstimateInput& input, RigAdjustmentOptions& options,
                                 const solver::RigValues& start, RigProblem& problem) {
   const solver::ReprojectionProblem before = problem.selected.problem;
-  RigAdjustment out = adjust_rig(problem.selected.problem, options, start, input.stop, input.pool);
+  RigAdjustment out = adjust_rig(problem.selected.problem, options, start, input.stop);
   if (!out.done) return out;
   const double correlated = correlation_in_images(input.map, problem, out.values);
   if (correlated <= options.correlated_observations) return out;
   options.correlated_observations = correlated;
   problem.selected.problem = before;
-  return adjust_rig(problem.selected.problem, options, start, input.stop, input.pool);
+  return adjust_rig(problem.selected.problem, options, start, input.stop);
 }
 
 // A map built with a wrong calibration contains mostly the observations that agree with it, so adjusting it once stops
@@ -93,12 +93,12 @@ void adjust_in_passes(const EstimateInput& input, RigAdjustmentOptions options, 
     estimate.settled = recover(input, estimate.cameras, before, estimate.problem) == 0;
     if (estimate.settled) break;
     separate_groups(estimate.problem);
-    RigAdjustment again = adjust_rig(estimate.problem.selected.problem, coarse, before, input.stop, input.pool);
+    RigAdjustment again = adjust_rig(estimate.problem.selected.problem, coarse, before, input.stop);
     if (!again.done) break;
     again.scale_change *= out.scale_change;
     out = std::move(again);
   }
-  estimate.adjusted = out.done ? adjust_weighted(input, options, std::move(out), estimate.problem) : out;
+  estimate.adjusted = out.done ? adjust_weighted(options, std::move(out), estimate.problem, input.stop) : out;
 }
 
 }  // namespace

@@ -17,8 +17,7 @@ struct EstimateInput {
   const CalibrationOptions& options;
   const feature::FeatureModel& features;
   const std::stop_token& stop;
-  KeyframeId first{0};         // the first one of this run; those before it are of a map that was loaded
-  ThreadPool* pool = nullptr;  // threads for adjustments, without any effect on the result; null for the caller alone
+  KeyframeId first{0};  // the first one of this run; those before it are of a map that was loaded
 };
 
 struct RigEstimate {

@@ -150,10 +150,9 @@ RigRefinement evaluate(const EstimateInput& input, RigEstimate&& estimate) {
 }  // namespace
 
 RigRefinement refine_rig(const map::BundledMap& map, const camera::Rig& calibrated, const CalibrationOptions& options,
-                         const feature::FeatureModel& features, std::stop_token stop, KeyframeId first,
-                         ThreadPool* pool) {
+                         const feature::FeatureModel& features, std::stop_token stop, KeyframeId first) {
   if (!can_refine(map)) return {};
-  const EstimateInput input{map, calibrated, options, features, stop, first, pool};
+  const EstimateInput input{map, calibrated, options, features, stop, first};
   const MovedCameras cameras = moves_of_map(map);
   return evaluate(input, estimate_rig_and_moves(input, prior_with_timing(input, cameras), cameras));
 }
@@ -178,14 +177,14 @@ bool replaced(const camera::Rig& of_map, const camera::Rig& calibrated) {
 std::optional<RigRefinement> refine_if_accepted(const map::BundledMap& map, const camera::Rig& calibrated,
                                                 const CalibrationOptions& options,
                                                 const feature::FeatureModel& features, const std::stop_token& stop,
-                                                KeyframeId first, ThreadPool* pool) {
+                                                KeyframeId first) {
   if (options.refine == Refine::kFalse || !can_refine(map)) return std::nullopt;
-  const EstimateInput input{map, calibrated, options, features, stop, first, pool};
+  const EstimateInput input{map, calibrated, options, features, stop, first};
   const MovedCameras cameras = moves_of_map(map);
   const RigAdjustmentOptions prior = prior_with_timing(input, cameras);
   if (options.refine == Refine::kAuto && !replaced(map.rig(), calibrated)) {
     const CalibrationOptions fraction = quick(options);
-    const EstimateInput of_fraction{map, calibrated, fraction, features, stop, KeyframeId(0), pool};
+    const EstimateInput of_fraction{map, calibrated, fraction, features, stop};
     const RigRefinement verdict = evaluate(of_fraction, estimate_rig(of_fraction, for_verdict(prior), cameras));
     if (!accepted(verdict, options)) return std::nullopt;
   }

@@ -185,11 +185,10 @@ struct RigRefinement {
 // Selects keyframes and landmarks and adjusts them with free calibration, beginning with the rig of the map; the map is
 // not changed. `calibrated`: the given calibration, from which changes are counted. `features` as in adjust_map.
 // `first`: the first keyframe of this run; those before it are of a map that was loaded. Deterministic. Takes seconds
-// with the default options, and longer if a camera was moved. The result does not depend on the number of threads in
-// `pool`; null: one.
+// with the default options, and longer if a camera was moved.
 RigRefinement refine_rig(const map::BundledMap& map, const camera::Rig& calibrated, const CalibrationOptions& options,
                          const feature::FeatureModel& features, std::stop_token stop = {},
-                         KeyframeId first = KeyframeId(0), ThreadPool* pool = nullptr);
+                         KeyframeId first = KeyframeId(0));
 
 // The inverse of the covariance of the given calibration, (n, n), in the unknowns of RigInformation.
 Eigen::MatrixXd prior_information(const camera::Rig& calibrated, const CalibrationOptions& options);
@@ -204,7 +203,7 @@ bool replaced(const camera::Rig& of_map, const camera::Rig& calibrated);
 std::optional<RigRefinement> refine_if_accepted(const map::BundledMap& map, const camera::Rig& calibrated,
                                                 const CalibrationOptions& options,
                                                 const feature::FeatureModel& features, const std::stop_token& stop = {},
-                                                KeyframeId first = KeyframeId(0), ThreadPool* pool = nullptr);
+                                                KeyframeId first = KeyframeId(0));
 // Moves the submap of a keyframe as a whole so that the keyframe has the given pose. The origin of the world frame is
 // the original pose of the root. The displacement of the root is therefore an error of all keyframes, and is added to
 // their uncertainty.

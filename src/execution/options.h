@@ -17,7 +17,7 @@ enum class Mode {
 };
 
 struct ExecutionOptions {
-  int threads = 0;  // 0: number of hardware threads. For loops over cameras, at most one per camera, and over landmarks
+  int threads = 0;  // threads for loops over cameras; 0: number of hardware threads, at most one per camera
   int max_pending_keyframes = 3;  // queue length of a background stage; adding to a full queue waits
   // Frames wait for the first calibrations and the mapping before them (execution::awaited), if the calibration is to
   // be estimated. Not in sequential mode, which always waits, and not where frames come in real time.
@@ -30,17 +30,16 @@ struct ExecutionOptions {
   // be slightly longer than the stage takes, to avoid waiting; lag_global is for maps of some hundred keyframes.
   int lag_keyframe = 1, lag_map = 3, lag_loop = 5, lag_calibrate = 40, lag_global = 40;
 
-  int available_threads() const { return threads > 0 ? threads : processor_cores(); }
   // Number of threads for loops over this number of cameras.
-  int threads_for(std::size_t cameras) const { return std::min(available_threads(), static_cast<int>(cameras)); }
+  int threads_for(std::size_t cameras) const {
+    const int available = threads > 0 ? threads : processor_cores();
+    return std::min(available, static_cast<int>(cameras));
+  }
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor& visitor) {
-    visitor(
-        "threads", self.threads, Range{0, 256}, "",
-        "threads for loops over cameras and, in adjustments of the whole map, over landmarks; 0: number of hardware "
-        "threads",
-        kCommon);
+    visitor("threads", self.threads, Range{0, 256}, "", "threads for loops over cameras; 0: number of hardware threads",
+            kCommon);
     visitor("max_pending_keyframes", self.max_pending_keyframes, Range{1, 1000}, "",
             "maximum number of keyframes waiting for a background stage", OptionNote{.formerly = "pending_keyframes"});
     visitor(

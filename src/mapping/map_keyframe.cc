@@ -90,8 +90,8 @@ void map_keyframe(KeyframeId keyframe, const MappingOptions& options, const Feat
 }
 
 bool adjust_globally(const MappingOptions& options, const FeatureModel& features, map::MapDraft& draft,
-                     std::stop_token stop, ThreadPool* pool) {
-  return adjustment::adjust_map(select_all(draft.map()), options.global, features, draft, std::move(stop), pool);
+                     std::stop_token stop) {
+  return adjustment::adjust_map(select_all(draft.map()), options.global, features, draft, stop);
 }
 
 }  // namespace bslam::mapping

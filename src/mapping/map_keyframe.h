@@ -20,6 +20,6 @@ void map_keyframe(KeyframeId keyframe, const MappingOptions& options, const Feat
 // Global bundle adjustment of all keyframes except the roots, and all landmarks. Returns false if nothing was adjusted;
 // see adjustment::adjust_map.
 bool adjust_globally(const MappingOptions& options, const FeatureModel& features, map::MapDraft& draft,
-                     std::stop_token stop = {}, ThreadPool* pool = nullptr);
+                     std::stop_token stop = {});
 
 }  // namespace bslam::mapping

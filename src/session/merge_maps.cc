@@ -12,7 +12,6 @@
 
 #include "base/assert.h"
 #include "base/interrupted.h"
-#include "base/thread_pool.h"
 #include "looping/loop_closer.h"
 #include "map/append_map.h"
 #include "map/map_store.h"
@@ -212,8 +211,7 @@ void adjust_merged(map::BundledMap& map, const system::Config& config, const std
   const feature::FeatureModel features = features_of(map, config);
   map::MapStore store(std::move(map));
   map::MapDraft draft(store.snapshot());
-  ThreadPool pool(config.execution.available_threads());
-  mapping::adjust_globally(config.mapping, features, draft, interrupted, &pool);
+  mapping::adjust_globally(config.mapping, features, draft, interrupted);
   store.commit(std::move(draft));
   map = *store.snapshot();
 }

@@ -110,7 +110,7 @@ std::vector<std::optional<geometry::PoseUncertainty>> uncertainties_of(
 }  // namespace
 
 BundleSummary adjust(ReprojectionProblem& problem, const BundleOptions& options, std::span<const std::uint8_t> skip,
-                     std::stop_token stop, ThreadPool* pool) {
+                     std::stop_token stop) {
   const std::vector<double> chi2 = squared_errors(problem);
   BSLAM_ASSERT(problem.pose_free.empty() || std::ranges::find(problem.pose_free, 0) != problem.pose_free.end(),
                "at least one pose must be fixed");
@@ -120,7 +120,7 @@ BundleSummary adjust(ReprojectionProblem& problem, const BundleOptions& options,
   if (structure.num_points() == 0) return {};
   const Kernel kernel = options.robust ? Kernel::kHuber : Kernel::kNone;
   const RigBlocks constant_rig;
-  BundleEquations equations(problem, structure, constant_rig, kernel, options.dense_poses, state_of(problem), pool);
+  BundleEquations equations(problem, structure, constant_rig, kernel, options.dense_poses, state_of(problem));
   BundleSummary summary{
       minimise(equations, {.iterations = options.iterations, .relative_decrease = options.relative_decrease}, stop),
       {}};

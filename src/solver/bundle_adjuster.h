@@ -14,10 +14,6 @@
 #include "solver/reprojection.h"
 #include "solver/rig_block.h"
 
-namespace bslam {
-class ThreadPool;
-}
-
 namespace bslam::solver {
 
 // Observations refer to poses and points by index. Poses are poses of the rig, so that N cameras add no unknowns.
@@ -75,9 +71,9 @@ struct BundleSummary : LmSummary {
 // ignored, also in the costs: those flagged in `skip` (one flag per observation, or empty), those that do not project
 // or have a squared error above kMaxChi2 at the initial values, and those of points with fewer than two remaining
 // observations. A stop request ends the optimisation after the current step and keeps the improvement so far. Bitwise
-// deterministic, whatever the number of threads in `pool`; null: one.
+// deterministic.
 BundleSummary adjust(ReprojectionProblem& problem, const BundleOptions& options,
-                     std::span<const std::uint8_t> skip = {}, std::stop_token stop = {}, ThreadPool* pool = nullptr);
+                     std::span<const std::uint8_t> skip = {}, std::stop_token stop = {});
 
 // Asserts that the sizes of a problem fit together and that its observations are in order and refer to its poses,
 // points and cameras. Every function that reads the observations of a problem does this first.

@@ -5,11 +5,15 @@
 #include <cmath>
 #include <limits>
 
-#include "base/thread_pool.h"
 #include "matrix/outer_product.h"
 
 namespace bslam::solver {
 namespace {
+
+// Damping of an information matrix: large enough to factorise points without parallax, small compared to a prior. It
+// must be small because a common scale of all lengths is constrained by the prior only, but changes every point, each
+// of which is damped.
+constexpr double kInformationDamping = 1e-13;
 
 // L with L L^T = V + damping * diag(V).
 geometry::Matrix3d damped_cholesky(const geometry::Matrix3d& V, double damping) {
@@ -43,43 +47,29 @@ BundleState state_of(const ReprojectionProblem& problem) {
 }
 
 BundleEquations::BundleEquations(const ReprojectionProblem& problem, const BundleStructure& structure,
-                                 const RigBlocks& rig_blocks, Kernel kernel, int dense_poses, BundleState start,
-                                 ThreadPool* pool)
+                                 const RigBlocks& rig_blocks, Kernel kernel, int dense_poses, BundleState start)
     : problem_(problem),
       structure_(structure),
       kernel_(kernel),
       cameras_(problem.rig->size()),
-      pool_(pool),
-      ranges_(point_ranges(structure)),
       state_(std::move(start)),
       trial_(state_),
       pose_blocks_(structure.pose_of_slot.size()),
       point_blocks_(structure.num_points()),
       L_(structure.num_points()),
       system_(structure.pattern, structure.frame_sizes, rig_size(rig_blocks), storage_for(structure, dense_poses)),
-      rig_(structure, problem.rig->size(), rig_blocks, system_.frames().rows()),
-      point_delta_(structure.num_points()) {
-  std::size_t free_groups = 0;
+      rig_(structure, problem.rig->size(), rig_blocks, system_.frames().rows()) {
+  std::size_t free_groups = 0, most_in_point = 0;
   for (std::size_t i = 0; i < structure.num_points(); ++i) {
     first_W_.push_back(free_groups);
     for (std::size_t g = structure.points[i].first_group; g < structure.points[i + 1].first_group; ++g) {
       free_groups += structure.groups[g].slot >= 0;
     }
+    most_in_point = std::max(most_in_point, free_groups - first_W_.back());
   }
   first_W_.push_back(free_groups);
   W_.resize(free_groups);
-  std::size_t terms = 0, groups = 0, couplings = 0, points = 0;
-  for (const PointRange& range : ranges_) {
-    const std::size_t end = structure.points[range.end].first_group;
-    terms = std::max(terms, structure.groups[end].first_term - range.first_term);
-    groups = std::max(groups, end - range.first_group);
-    couplings = std::max(couplings, first_W_[range.end] - first_W_[range.begin]);
-    points = std::max(points, range.end - range.begin);
-  }
-  term_costs_.resize(terms);
-  group_sums_.resize(groups);
-  U_.resize(couplings);
-  y_.resize(points);
+  U_.resize(most_in_point);
 }
 
 void BundleEquations::set_poses(const BundleState& state) {
@@ -104,40 +94,32 @@ void BundleEquations::set_poses(const BundleState& state) {
 double BundleEquations::cost(const BundleState& state) {
   double sum = 0.0;
   set_poses(state);
-  for (const PointRange& range : ranges_) {
-    for_each_point(range, pool_, [&](std::size_t i) { cost_of_point(state, range, i); });
-    const std::size_t end = structure_.groups[structure_.points[range.end].first_group].first_term;
-    for (std::size_t k = range.first_term; k < end; ++k) sum += term_costs_[k - range.first_term];
+  for (std::size_t i = 0; i < structure_.num_points(); ++i) {
+    const Vector3d& point = state.points[static_cast<std::size_t>(structure_.points[i].point)];
+    for (std::size_t g = structure_.points[i].first_group; g < structure_.points[i + 1].first_group; ++g) {
+      const Rigid& pose = poses_[static_cast<std::size_t>(structure_.groups[g].pose)];
+      const Vector3d point_rig = pose.R * point + pose.t;
+      for (std::size_t k = structure_.groups[g].first_term; k < structure_.groups[g + 1].first_term; ++k) {
+        const BundleStructure::Term& term = structure_.terms[k];
+        const auto error =
+            residual_error(state.rig.models[static_cast<std::size_t>(term.camera)],
+                           in_camera(structure_.groups[g].pose, term, point_rig), term.pixel.cast<double>());
+        sum += kernel_cost(
+            kernel_, error ? (term.inverse_sigma * *error).squaredNorm() : std::numeric_limits<double>::infinity());
+      }
+    }
   }
   return 0.5 * sum + rig_.prior_cost(state.rig);
 }
 
-void BundleEquations::cost_of_point(const BundleState& state, const PointRange& range, std::size_t i) {
-  const Vector3d& point = state.points[static_cast<std::size_t>(structure_.points[i].point)];
-  for (std::size_t g = structure_.points[i].first_group; g < structure_.points[i + 1].first_group; ++g) {
-    const Rigid& pose = poses_[static_cast<std::size_t>(structure_.groups[g].pose)];
-    const Vector3d point_rig = pose.R * point + pose.t;
-    for (std::size_t k = structure_.groups[g].first_term; k < structure_.groups[g + 1].first_term; ++k) {
-      const BundleStructure::Term& term = structure_.terms[k];
-      const auto error =
-          residual_error(state.rig.models[static_cast<std::size_t>(term.camera)],
-                         in_camera(structure_.groups[g].pose, term, point_rig), term.pixel.cast<double>());
-      term_costs_[k - range.first_term] = kernel_cost(
-          kernel_, error ? (term.inverse_sigma * *error).squaredNorm() : std::numeric_limits<double>::infinity());
-    }
-  }
-}
-
-void BundleEquations::sum_group(std::size_t point, std::size_t group, const Rigid& pose, GroupSums& sums) {
-  sums.M.setZero();
-  sums.m.setZero();
-  sums.cost = 0.0;
+BundleEquations::GroupSums BundleEquations::sum_group(std::size_t group, const Rigid& pose, const Vector3d& point_rig) {
+  GroupSums out;
   const int slot = structure_.groups[group].slot;
-  const RigTerms::Point of_rig{point, sums.point_rig, pose.R, slot < 0 ? -1 : system_.frames().offset(slot)};
+  const RigTerms::Point point{point_rig, pose.R, slot < 0 ? -1 : system_.frames().offset(slot)};
   for (std::size_t k = structure_.groups[group].first_term; k < structure_.groups[group + 1].first_term; ++k) {
     const BundleStructure::Term& term = structure_.terms[k];
     const Rigid& T = cam_from_rig(structure_.groups[group].pose, term.camera);
-    const Vector3d p = in_camera(structure_.groups[group].pose, term, sums.point_rig);
+    const Vector3d p = in_camera(structure_.groups[group].pose, term, point_rig);
     const auto camera = static_cast<std::size_t>(term.camera);
     const auto r = residual(state_.rig.models[camera], p, term.pixel.cast<double>());
     Vector2d e = Vector2d::Zero();
@@ -146,65 +128,57 @@ void BundleEquations::sum_group(std::size_t point, std::size_t group, const Rigi
       e = term.inverse_sigma * r->error;
       chi2 = e.squaredNorm();
     }
-    sums.cost += kernel_cost(kernel_, chi2);
-    if (!(chi2 < kMaxChi2)) {
-      if (rig_.size() > 0) rig_.leave_out(k);
-      continue;
-    }
+    out.cost += kernel_cost(kernel_, chi2);
+    if (!(chi2 < kMaxChi2)) continue;
     const double weight = kernel_weight(kernel_, chi2);
     const Matrix23d J = term.inverse_sigma * r->J;
     const Matrix23d A = at_capture(J, structure_.groups[group].pose, term) * T.R;
     const Matrix23d wA = weight * A;
-    sums.M.noalias() += A.transpose() * wA;
-    sums.m.noalias() += wA.transpose() * e;
+    out.M.noalias() += A.transpose() * wA;
+    out.m.noalias() += wA.transpose() * e;
     if (rig_.size() == 0) continue;
     const RowMotion row = row_motion(structure_.groups[group].pose, term, p);
-    rig_.add(k, {term.camera, state_.rig, p, J, row.velocity, row.relative_row, term.inverse_sigma}, A, e, weight,
-             of_rig);
+    rig_.add({term.camera, state_.rig, p, J, row.velocity, row.relative_row, term.inverse_sigma}, A, e, weight, point);
   }
+  return out;
 }
 
-// With G = [-[P']x  I]: V = sum of R^T M R, b = sum of R^T m, and W = G^T M R for each free pose, rotation first.
-void BundleEquations::linearise_point(const PointRange& range, std::size_t i) {
-  if (rig_.size() > 0) rig_.begin_point(i);
+// With G = [-[P']x  I]: H += G^T M G, b += G^T m, W = G^T M R. Rotation first.
+void BundleEquations::add_to_pose(const GroupSums& sums, const Vector3d& point_rig, const Matrix3d& R_rig_world,
+                                  PoseBlock& pose, Matrix63d& W) const {
+  const Matrix3d P = geometry::skew(point_rig);
+  const Matrix3d PM = P * sums.M;
+  pose.H.topLeftCorner<3, 3>().noalias() -= PM * P;
+  pose.H.bottomLeftCorner<3, 3>() += PM.transpose();  // the upper triangle is not stored
+  pose.H.bottomRightCorner<3, 3>() += sums.M;
+  pose.b.head<3>() += point_rig.cross(sums.m);
+  pose.b.tail<3>() += sums.m;
+  W.topRows<3>().noalias() = PM * R_rig_world;
+  W.bottomRows<3>().noalias() = sums.M * R_rig_world;
+}
+
+// Adds the costs of the point's observations to `sum`.
+void BundleEquations::linearise_point(std::size_t i, double& sum) {
   const Vector3d& point = state_.points[static_cast<std::size_t>(structure_.points[i].point)];
   PointBlock block{Matrix3d::Zero(), Vector3d::Zero()};
   std::size_t next_W = first_W_[i];
   for (std::size_t g = structure_.points[i].first_group; g < structure_.points[i + 1].first_group; ++g) {
     const BundleStructure::Group& group = structure_.groups[g];
     const Rigid& pose = poses_[static_cast<std::size_t>(group.pose)];
-    GroupSums& sums = group_sums_[g - range.first_group];
-    sums.point_rig = pose.R * point + pose.t;
-    sum_group(i, g, pose, sums);
+    const Vector3d point_rig = pose.R * point + pose.t;
+    const GroupSums sums = sum_group(g, pose, point_rig);
+    sum += sums.cost;
     block.b.noalias() += pose.R.transpose() * sums.m;
     if (group.slot < 0) {
       const Matrix3d MR = sums.M * pose.R;
       block.V.noalias() += pose.R.transpose() * MR;
     } else {
       Matrix63d& W = W_[next_W++];
-      sums.PM = geometry::skew(sums.point_rig) * sums.M;
-      W.topRows<3>().noalias() = sums.PM * pose.R;
-      W.bottomRows<3>().noalias() = sums.M * pose.R;
+      add_to_pose(sums, point_rig, pose.R, pose_blocks_[static_cast<std::size_t>(group.slot)], W);
       block.V.noalias() += pose.R.transpose() * W.bottomRows<3>();
     }
   }
   point_blocks_[i] = block;
-}
-
-// H += G^T M G, b += G^T m for every shares-th pose.
-void BundleEquations::add_to_poses(const PointRange& range, std::size_t share, std::size_t shares) {
-  const std::size_t end = structure_.points[range.end].first_group;
-  for (std::size_t g = range.first_group; g < end; ++g) {
-    const int slot = structure_.groups[g].slot;
-    if (slot < 0 || static_cast<std::size_t>(slot) % shares != share) continue;
-    const GroupSums& sums = group_sums_[g - range.first_group];
-    PoseBlock& pose = pose_blocks_[static_cast<std::size_t>(slot)];
-    pose.H.topLeftCorner<3, 3>().noalias() -= sums.PM * geometry::skew(sums.point_rig);
-    pose.H.bottomLeftCorner<3, 3>() += sums.PM.transpose();  // the upper triangle is not stored
-    pose.H.bottomRightCorner<3, 3>() += sums.M;
-    pose.b.head<3>() += sums.point_rig.cross(sums.m);
-    pose.b.tail<3>() += sums.m;
-  }
 }
 
 double BundleEquations::linearise() {
@@ -215,65 +189,44 @@ double BundleEquations::linearise() {
   }
   if (rig_.size() > 0) rig_.begin(state_.rig);
   double sum = 0.0;
-  for (const PointRange& range : ranges_) {
-    if (rig_.size() > 0) rig_.begin_points(range);
-    for_each_point(range, pool_, [&](std::size_t i) { linearise_point(range, i); });
-    for_each_share(pool_, [&](std::size_t share, std::size_t shares) {
-      add_to_poses(range, share, shares);
-      if (rig_.size() > 0) rig_.accumulate(share, shares);
-    });
-    for (std::size_t g = range.first_group; g < structure_.points[range.end].first_group; ++g)
-      sum += group_sums_[g - range.first_group].cost;
+  for (std::size_t i = 0; i < structure_.num_points(); ++i) {
+    if (rig_.size() > 0) rig_.begin_point(i);
+    linearise_point(i, sum);
   }
   return 0.5 * sum + rig_.prior_cost(state_.rig);
 }
 
-// L L^T = V, y = L^-1 b and U = W L^-T.
-void BundleEquations::factorise_point(const PointRange& range, std::size_t point, double damping) {
+// Eliminates the point from the reduced system: S_ab -= U_a U_b^T, r_a -= U_a (L^-1 b), U = W L^-T.
+void BundleEquations::eliminate_point(std::size_t point, double damping) {
   const Matrix3d L = damped_cholesky(point_blocks_[point].V, damping);
   L_[point] = L;
   const double i0 = 1.0 / L(0, 0), i1 = 1.0 / L(1, 1), i2 = 1.0 / L(2, 2);
-  Vector3d& y = y_[point - range.begin];
-  y = point_blocks_[point].b;
+  Vector3d y = point_blocks_[point].b;
   L.triangularView<Eigen::Lower>().solveInPlace(y);
-  std::size_t next = first_W_[point];
-  for (std::size_t g = structure_.points[point].first_group; next < first_W_[point + 1]; ++g) {
+  const int* block = structure_.pair_block.data() + structure_.points[point].first_pair;
+  const std::size_t first = first_W_[point], count = first_W_[point + 1] - first;
+  std::size_t a = 0;
+  for (std::size_t g = structure_.points[point].first_group; a < count; ++g) {
     const int slot = structure_.groups[g].slot;
     if (slot < 0) continue;
-    RigTerms::PoseCoupling& coupling = U_[next - first_W_[range.begin]];
-    const Matrix63d& W = W_[next++];
-    Matrix63d& U = coupling.U;
+    const Matrix63d& W = W_[first + a];
+    Matrix63d& U = U_[a].U;
     U.col(0) = W.col(0) * i0;
     U.col(1) = (W.col(1) - L(1, 0) * U.col(0)) * i1;
     U.col(2) = (W.col(2) - L(2, 0) * U.col(0) - L(2, 1) * U.col(1)) * i2;
-    coupling.slot = slot;
-    coupling.pose_offset = system_.frames().offset(slot);
-  }
-  if (rig_.size() > 0) rig_.couple(point, L);
-}
-
-// Eliminates the point from the equations of every shares-th pose a: S_ab -= U_a U_b^T, r_a -= U_a y.
-void BundleEquations::eliminate_point(const PointRange& range, std::size_t point, std::size_t share,
-                                      std::size_t shares) {
-  const int* block = structure_.pair_block.data() + structure_.points[point].first_pair;
-  const std::span<const RigTerms::PoseCoupling> of_point(U_.data() + (first_W_[point] - first_W_[range.begin]),
-                                                         first_W_[point + 1] - first_W_[point]);
-  const Vector3d& y = y_[point - range.begin];
-  for (std::size_t a = 0; a < of_point.size(); block += ++a) {
-    const RigTerms::PoseCoupling& coupling = of_point[a];
-    if (static_cast<std::size_t>(coupling.slot) % shares != share) continue;
-    system_.rhs().segment<6>(coupling.pose_offset).noalias() -= coupling.U * y;
+    U_[a].pose_offset = system_.frames().offset(slot);
+    system_.rhs().segment<6>(U_[a].pose_offset).noalias() -= U * y;
     for (std::size_t b = 0; b <= a; ++b) {
-      auto S = system_.frames().leading<6>(block[b]);
+      auto S = system_.frames().leading<6>(*block++);
       if (S.outerStride() == 6) {
-        matrix::subtract_outer_product(coupling.U, of_point[b].U, S.data());
+        matrix::subtract_outer_product(U, U_[b].U, S.data());
       } else {
-        S.noalias() -= coupling.U.lazyProduct(of_point[b].U.transpose());
+        S.noalias() -= U.lazyProduct(U_[b].U.transpose());
       }
     }
-    if (rig_.size() > 0) rig_.eliminate_from(coupling, point, system_);
+    ++a;
   }
-  if (rig_.size() > 0) rig_.eliminate(point, y, share, shares, system_);
+  if (rig_.size() > 0) rig_.eliminate(point, L, y, {U_.data(), count}, system_);
 }
 
 ReducedSystem& BundleEquations::reduce(double damping) {
@@ -286,14 +239,86 @@ ReducedSystem& BundleEquations::reduce(double damping) {
     system_.rhs().segment<6>(system_.frames().offset(at)) = pose_blocks_[slot].b;
   }
   if (rig_.size() > 0) rig_.copy_to(damping, system_);
-  for (const PointRange& range : ranges_) {
-    if (rig_.size() > 0) rig_.begin_points(range);
-    for_each_point(range, pool_, [&](std::size_t i) { factorise_point(range, i, damping); });
-    for_each_share(pool_, [&](std::size_t share, std::size_t shares) {
-      for (std::size_t i = range.begin; i < range.end; ++i) eliminate_point(range, i, share, shares);
-    });
-  }
+  for (std::size_t i = 0; i < structure_.num_points(); ++i) eliminate_point(i, damping);
   return system_;
+}
+
+std::optional<Eigen::MatrixXd> BundleEquations::rig_information() {
+  if (!reduce(kInformationDamping).solve(delta_)) return std::nullopt;
+  return system_.rig_information();
+}
+
+bool BundleEquations::factorise() { return reduce(kInformationDamping).factorise(); }
+
+int BundleEquations::slot_of(int pose) const {
+  const auto slot = std::ranges::find(structure_.pose_of_slot, pose);
+  return slot == structure_.pose_of_slot.end() ? -1 : static_cast<int>(slot - structure_.pose_of_slot.begin());
+}
+
+std::vector<std::optional<geometry::Matrix6d>> BundleEquations::pose_covariances(std::span<const int> poses) {
+  std::vector<std::optional<Matrix6d>> out(poses.size());
+  if (!factorise()) return out;
+  std::vector<int> slots;
+  std::vector<std::size_t> asked;  // position of each slot in `poses`
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const int slot = slot_of(poses[i]);
+    if (slot < 0) continue;
+    slots.push_back(slot);
+    asked.push_back(i);
+  }
+  const std::vector<geometry::Matrix6d> covariances = system_.pose_covariances(slots);
+  for (std::size_t i = 0; i < slots.size(); ++i) {
+    if (covariances[i].allFinite()) out[asked[i]] = covariances[i];
+  }
+  return out;
+}
+
+// The rows of each of these poses; nullopt if it is not a variable, or they are not finite.
+std::vector<std::optional<geometry::PoseUncertainty::Effect>> BundleEquations::rows_of(
+    std::span<const int> poses, const Eigen::MatrixXd& effect) const {
+  std::vector<std::optional<geometry::PoseUncertainty::Effect>> out(poses.size());
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const int slot = slot_of(poses[i]);
+    if (slot < 0) continue;
+    const auto of_pose = effect.middleRows<6>(system_.frames().offset(slot));
+    if (of_pose.allFinite()) out[i] = of_pose;
+  }
+  return out;
+}
+
+std::vector<std::optional<geometry::PoseUncertainty::Effect>> BundleEquations::rig_effects(
+    std::span<const int> poses, const Eigen::MatrixXd& rig_deviation) const {
+  return rows_of(poses, system_.rig_sensitivity() * rig_deviation);
+}
+
+// Solves S_xx F_x = -(B_x L + S_xf F_f) for the effects F_x on poses x, where the effects F_f on the other poses f are
+// given.
+std::vector<std::optional<geometry::PoseUncertainty::Effect>> BundleEquations::rig_effects(
+    std::span<const int> poses, const Eigen::MatrixXd& rig_deviation,
+    std::span<const geometry::PoseUncertainty::Effect> given) {
+  reduce(kInformationDamping);
+  Eigen::MatrixXd S = Eigen::MatrixXd::Zero(system_.frames().rows(), system_.frames().rows());
+  system_.frames().copy_to(S);
+  S.triangularView<Eigen::StrictlyUpper>() = S.transpose();
+  Eigen::MatrixXd effect = Eigen::MatrixXd::Zero(S.rows(), rig_deviation.cols());
+  std::vector<int> sought;  // rows
+  for (std::size_t slot = 0; slot < structure_.pose_of_slot.size(); ++slot) {
+    const geometry::PoseUncertainty::Effect& known = given[static_cast<std::size_t>(structure_.pose_of_slot[slot])];
+    const int at = system_.frames().offset(static_cast<int>(slot));
+    if (known.cols() > 0) {
+      effect.middleRows<6>(at) = known;
+    } else {
+      for (int k = 0; k < 6; ++k) sought.push_back(at + k);
+    }
+  }
+  const Eigen::MatrixXd rhs = (-(system_.border() * rig_deviation + S * effect)).eval()(sought, Eigen::all);
+  const Eigen::MatrixXd of_sought = S(sought, sought);
+  const Eigen::LLT<Eigen::MatrixXd> factor(of_sought);
+  if (factor.info() != Eigen::Success)
+    return std::vector<std::optional<geometry::PoseUncertainty::Effect>>(poses.size());
+  const Eigen::MatrixXd found = factor.solve(rhs);
+  effect(sought, Eigen::all) = found;
+  return rows_of(poses, effect);
 }
 
 // V delta_p = b - sum of W^T delta over the point's free poses and the rig.
@@ -329,10 +354,8 @@ std::optional<double> BundleEquations::solve(double damping) {
     for (int k = 0; k < rig_.size(); ++k) gain += damping * bounded_diagonal(rig_.H()(k, k)) * delta(k) * delta(k);
     rig_.apply(delta, trial_.rig);
   }
-  for (const PointRange& range : ranges_)
-    for_each_point(range, pool_, [&](std::size_t i) { point_delta_[i] = point_update(i); });
   for (std::size_t i = 0; i < structure_.num_points(); ++i) {
-    const Vector3d& delta = point_delta_[i];
+    const Vector3d delta = point_update(i);
     const PointBlock& block = point_blocks_[i];
     gain += delta.dot(block.b);
     for (int k = 0; k < 3; ++k) gain += damping * bounded_diagonal(block.V(k, k)) * delta(k) * delta(k);
@@ -340,6 +363,18 @@ std::optional<double> BundleEquations::solve(double damping) {
   }
   if (!std::isfinite(gain)) return std::nullopt;
   return 0.5 * gain;
+}
+
+Eigen::MatrixXd information_of_prior(const RigBlocks& blocks, const RigValues& values) {
+  int size = 0, at = 0;
+  for (const auto& block : blocks) size += block->size();
+  Eigen::MatrixXd prior = Eigen::MatrixXd::Zero(size, size);
+  Eigen::VectorXd gradient = Eigen::VectorXd::Zero(size);
+  for (const auto& block : blocks) {
+    block->add_prior(values, prior.block(at, at, block->size(), block->size()), gradient.segment(at, block->size()));
+    at += block->size();
+  }
+  return prior;
 }
 
 }  // namespace bslam::solver

@@ -29,10 +29,9 @@ class BundleEquations {
   using Vector6d = geometry::Vector6d;
 
   // `problem`, `structure` and `rig_blocks` must outlive the equations. `start`: initial values. Without rig blocks the
-  // rig is constant. Systems with more free poses than `dense_poses` are solved sparsely. `pool`: threads among which
-  // the points are divided, without any effect on the result; null for the calling thread alone.
+  // rig is constant. Systems with more free poses than `dense_poses` are solved sparsely.
   BundleEquations(const ReprojectionProblem& problem, const BundleStructure& structure, const RigBlocks& rig_blocks,
-                  Kernel kernel, int dense_poses, BundleState start, ThreadPool* pool = nullptr);
+                  Kernel kernel, int dense_poses, BundleState start);
 
   // Interface for solver/lm.h. The cost is half the sum of kernel costs plus the priors of the rig blocks.
   double linearise();
@@ -87,13 +86,11 @@ class BundleEquations {
     Matrix3d R;
     Vector3d t;  // metres
   };
-  // Sums over the observations of one group.
+  // Sums over the observations of one group, for their point in the rig frame.
   struct GroupSums {
-    Vector3d point_rig;  // their point in the rig frame
-    Matrix3d M;          // sum of w A^T A, A = J_h R_cam_rig / sigma
-    Matrix3d PM;         // [P']x M
-    Vector3d m;          // sum of w A^T e / sigma
-    double cost;
+    Matrix3d M = Matrix3d::Zero();  // sum of w A^T A, A = J_h R_cam_rig / sigma
+    Vector3d m = Vector3d::Zero();  // sum of w A^T e / sigma
+    double cost = 0.0;
   };
 
   void set_poses(const BundleState& state);
@@ -127,20 +124,17 @@ class BundleEquations {
     return J * shutters_[static_cast<std::size_t>(pose) * cameras_ + camera].row_jacobian(term.pixel.y());
   }
   double cost(const BundleState& state);
-  void cost_of_point(const BundleState& state, const PointRange& range, std::size_t point);
-  void sum_group(std::size_t point, std::size_t group, const Rigid& pose, GroupSums& sums);
-  void linearise_point(const PointRange& range, std::size_t point);
-  void add_to_poses(const PointRange& range, std::size_t share, std::size_t shares);
-  void factorise_point(const PointRange& range, std::size_t point, double damping);
-  void eliminate_point(const PointRange& range, std::size_t point, std::size_t share, std::size_t shares);
+  GroupSums sum_group(std::size_t group, const Rigid& pose, const Vector3d& point_rig);
+  void add_to_pose(const GroupSums& sums, const Vector3d& point_rig, const Matrix3d& R_rig_world, PoseBlock& pose,
+                   Matrix63d& W) const;
+  void linearise_point(std::size_t point, double& sum);
+  void eliminate_point(std::size_t point, double damping);
   Vector3d point_update(std::size_t point) const;
 
   const ReprojectionProblem& problem_;
   const BundleStructure& structure_;
   Kernel kernel_;
   std::size_t cameras_;
-  ThreadPool* pool_;
-  std::vector<PointRange> ranges_;
   BundleState state_, trial_;
   std::vector<Rigid> cam_from_rig_;        // (poses, cameras): T_cam_rig motion
   std::vector<camera::Shutter> shutters_;  // (poses, cameras); empty if none is rolling
@@ -150,16 +144,10 @@ class BundleEquations {
   std::vector<Matrix63d> W_;               // per free group, in order
   std::vector<std::size_t> first_W_;       // per point and one more
   std::vector<Matrix3d> L_;                // per point: Cholesky factor of the damped V
-  // Scratch memory of a range of points (solver/point_ranges.h): per term, per group, per free group, and per point the
-  // right-hand side L^-1 b.
-  std::vector<double> term_costs_;
-  std::vector<GroupSums> group_sums_;
-  std::vector<RigTerms::PoseCoupling> U_;
-  std::vector<Vector3d> y_;
+  std::vector<RigTerms::PoseCoupling> U_;  // scratch memory of one elimination
   ReducedSystem system_;
   RigTerms rig_;
-  Eigen::VectorXd delta_;              // frames, then rig
-  std::vector<Vector3d> point_delta_;  // per point of the structure
+  Eigen::VectorXd delta_;  // frames, then rig
 };
 
 // The information of the priors of the blocks at these values, as it is part of the information of the rig.

@@ -8,7 +8,7 @@ namespace bslam::solver {
 
 RigTerms::RigTerms(const BundleStructure& structure, std::size_t num_cameras, const RigBlocks& blocks,
                    int frame_unknowns)
-    : structure_(structure), blocks_(blocks), ranges_(num_cameras) {
+    : blocks_(blocks), ranges_(num_cameras) {
   int size = 0;
   for (const auto& block : blocks) {
     first_of_block_.push_back(size);
@@ -21,24 +21,15 @@ RigTerms::RigTerms(const BundleStructure& structure, std::size_t num_cameras, co
   H_.setZero(size, size);
   border_.setZero(frame_unknowns, size);
   b_.setZero(size);
-  for (std::size_t c = 0; c < num_cameras; ++c) {
-    std::ptrdiff_t columns = 0;
-    for (const Run& range : ranges_[c]) columns += range.size;
-    columns_ = std::max(columns_, columns);
-    const auto common = [&](const Run& a) { return [&a](const Run& b) { return a.unknown == b.unknown; }; };
-    std::size_t first = 0;
-    const auto shares = [&](const std::vector<Run>& other) {
-      return std::ranges::any_of(ranges_[c],
-                                 [&](const Run& range) { return std::ranges::any_of(other, common(range)); });
-    };
-    while (first < c && !shares(ranges_[first])) ++first;
-    sharing_.push_back(first == c ? c : sharing_[first]);
-  }
-  if (size > 0) find_couplings(structure);
+  J_.setZero(2, size);
+  wJ_.setZero(2, size);
+  U_.resize(3 * static_cast<std::size_t>(size));
+  column_of_.assign(static_cast<std::size_t>(size), -1);
+  if (size > 0) couple(structure);
 }
 
 // Finds the unknowns on which the observations of each point depend.
-void RigTerms::find_couplings(const BundleStructure& structure) {
+void RigTerms::couple(const BundleStructure& structure) {
   const auto size = static_cast<std::size_t>(this->size());
   std::vector<std::uint8_t> seen;
   std::size_t columns = 0;
@@ -85,82 +76,49 @@ void RigTerms::begin(const RigValues& values) {
   }
 }
 
-void RigTerms::begin_points(const PointRange& range) {
-  range_ = range;
-  const std::size_t terms = structure_.groups[structure_.points[range.end].first_group].first_term - range.first_term;
-  added_.resize(terms);
-  J_.resize(std::max(J_.size(), 2 * static_cast<std::size_t>(columns_) * terms));
-  U_.resize(std::max(U_.size(), 3 * (first_coupling_[range.end] - first_coupling_[range.begin])));
-}
-
 void RigTerms::begin_point(std::size_t point) {
-  std::fill_n(W_.data() + 3 * first_coupling_[point], 3 * num_coupled(point), 0.0);
+  W_of_point_ = W_.data() + 3 * first_coupling_[point];
+  W_columns_ = static_cast<std::ptrdiff_t>(first_coupling_[point + 1] - first_coupling_[point]);
+  std::fill_n(W_of_point_, 3 * W_columns_, 0.0);
+  for (std::size_t r = first_run_[point]; r < first_run_[point + 1]; ++r) {
+    for (int k = 0; k < runs_[r].size; ++k)
+      column_of_[static_cast<std::size_t>(runs_[r].unknown + k)] = runs_[r].first + k;
+  }
 }
 
 // With J = d pixel / d rig and G = [-[P']x  I]: H += w J^T J, b += w J^T e, border += G^T A^T w J, W += R^T A^T w J.
-void RigTerms::add(std::size_t term, const RigObservation& observation, const Matrix23d& A, const Vector2d& e,
-                   double weight, const Point& point) {
-  double* J = J_.data() + 2 * columns_ * static_cast<std::ptrdiff_t>(term - range_.first_term);
-  int column = 0;
+void RigTerms::add(const RigObservation& observation, const Matrix23d& A, const Vector2d& e, double weight,
+                   const Point& point) {
+  int columns = 0;
   for (const auto& block : blocks_) {
     const int size = block->columns(observation.camera).size;
-    if (size == 0) continue;
-    block->evaluate(observation, Eigen::Map<RigBlock::Jacobian, 0, Eigen::OuterStride<>>(
-                                     J + column, 2, size, Eigen::OuterStride<>(columns_)));
-    column += size;
+    if (size > 0) block->evaluate(observation, J_.middleCols(columns, size));
+    columns += size;
   }
-  const Matrix32d wAt = weight * A.transpose();
-  add_to_point(point.index, ranges_[static_cast<std::size_t>(observation.camera)], point.R_rig_world.transpose() * wAt,
-               J);
-  Added& added = added_[term - range_.first_term];
-  added.camera = observation.camera;
-  added.pose_offset = point.pose_offset;
-  added.weight = weight;
-  added.weighted_error = weight * e;
-  added.to_pose << geometry::skew(point.point_rig) * wAt, wAt;
-}
-
-void RigTerms::add_to_point(std::size_t point, std::span<const Run> ranges, const Matrix32d& to_point,
-                            const double* J) {
-  const std::span<const Run> runs = runs_of(point);
-  double* W = W_.data() + 3 * first_coupling_[point];
-  std::size_t run = 0;
-  for (const Run& range : ranges) {  // both are in the order of the unknowns
-    while (range.unknown >= runs[run].unknown + runs[run].size) ++run;
-    matrix::add_product_2({to_point.data(), 3, J, columns_, 3, range.size},
-                          W + runs[run].first + (range.unknown - runs[run].unknown), num_coupled(point));
-    J += range.size;
-  }
-}
-
-void RigTerms::accumulate(std::size_t share, std::size_t shares) {
-  std::vector<double> weighted_J(2 * static_cast<std::size_t>(columns_));
-  for (std::size_t k = 0; k < added_.size(); ++k) {
-    const Added& term = added_[k];
-    if (term.camera < 0 || sharing_[static_cast<std::size_t>(term.camera)] % shares != share) continue;
-    accumulate(term, J_.data() + 2 * columns_ * static_cast<std::ptrdiff_t>(k), weighted_J.data());
-  }
-}
-
-void RigTerms::accumulate(const Added& term, const double* J, double* weighted_J) {
-  const std::vector<Run>& ranges = ranges_[static_cast<std::size_t>(term.camera)];
-  for (std::ptrdiff_t k = 0; k < 2 * columns_; ++k) weighted_J[k] = term.weight * J[k];
-  const std::ptrdiff_t size = b_.size();
-  std::ptrdiff_t column = 0;
-  for (std::size_t i = 0; i < ranges.size(); ++i) {
+  const std::vector<Run>& ranges = ranges_[static_cast<std::size_t>(observation.camera)];
+  const RigBlock::Jacobian& J = J_;
+  wJ_.leftCols(columns) = weight * J.leftCols(columns);
+  const Eigen::Matrix<double, 3, 2> wAt = weight * A.transpose();
+  const Eigen::Matrix<double, 3, 2> to_point = point.R_rig_world.transpose() * wAt;
+  Eigen::Matrix<double, 6, 2> to_pose;
+  to_pose << geometry::skew(point.point_rig) * wAt, wAt;
+  const std::ptrdiff_t stride = J.cols(), size = b_.size();
+  for (std::size_t i = 0, column = 0; i < ranges.size(); ++i) {
     const Run& range = ranges[i];
-    const auto add = [&](const double* left, std::ptrdiff_t left_stride, int rows, double* C) {
-      matrix::add_product_2({left, left_stride, J + column, columns_, rows, range.size}, C, size);
+    const double* J_range = J.data() + column;
+    const auto add = [&](const double* left, std::ptrdiff_t left_stride, int rows, double* C, std::ptrdiff_t C_stride) {
+      matrix::add_product_2({left, left_stride, J_range, stride, rows, range.size}, C, C_stride);
     };
-    add(term.weighted_error.data(), 1, 1, &b_(range.unknown));
+    const Vector2d we = weight * e;
+    add(we.data(), 1, 1, &b_(range.unknown), size);
     // the columns of the lower triangle
-    std::ptrdiff_t other = 0;
-    for (std::size_t k = 0; k <= i; ++k) {
-      add(weighted_J + other, columns_, ranges[k].size, &H_(range.unknown, ranges[k].unknown));
-      other += ranges[k].size;
+    for (std::size_t k = 0, other = 0; k <= i; ++k) {
+      add(wJ_.data() + other, stride, ranges[k].size, &H_(range.unknown, ranges[k].unknown), size);
+      other += static_cast<std::size_t>(ranges[k].size);
     }
-    if (term.pose_offset >= 0) add(term.to_pose.data(), 6, 6, &border_(term.pose_offset, range.unknown));
-    column += range.size;
+    add(to_point.data(), 3, 3, W_of_point_ + column_of_[static_cast<std::size_t>(range.unknown)], W_columns_);
+    if (point.pose_offset >= 0) add(to_pose.data(), 6, 6, &border_(point.pose_offset, range.unknown), size);
+    column += static_cast<std::size_t>(range.size);
   }
 }
 
@@ -171,44 +129,29 @@ void RigTerms::copy_to(double damping, ReducedSystem& system) const {
   system.rhs().tail(b_.size()) = b_;
 }
 
-void RigTerms::couple(std::size_t point, const Matrix3d& L) {
-  const std::ptrdiff_t count = num_coupled(point);
+void RigTerms::eliminate(std::size_t point, const Matrix3d& L, const Vector3d& y, std::span<const PoseCoupling> poses,
+                         ReducedSystem& system) {
+  const auto count = static_cast<std::ptrdiff_t>(first_coupling_[point + 1] - first_coupling_[point]);
   const double *W0 = W_.data() + 3 * first_coupling_[point], *W1 = W0 + count, *W2 = W1 + count;
-  double* U0 = U_.data() + 3 * (first_coupling_[point] - first_coupling_[range_.begin]);
-  double *U1 = U0 + count, *U2 = U1 + count;
+  double *U0 = U_.data(), *U1 = U0 + count, *U2 = U1 + count;
   const double i0 = 1.0 / L(0, 0), i1 = 1.0 / L(1, 1), i2 = 1.0 / L(2, 2);
   for (std::ptrdiff_t k = 0; k < count; ++k) {
     U0[k] = W0[k] * i0;
     U1[k] = i1 * (W1[k] - L(1, 0) * U0[k]);
     U2[k] = i2 * (W2[k] - L(2, 0) * U0[k] - L(2, 1) * U1[k]);
   }
-}
-
-void RigTerms::eliminate_from(const PoseCoupling& pose, std::size_t point, ReducedSystem& system) const {
-  const double* U = U_.data() + 3 * (first_coupling_[point] - first_coupling_[range_.begin]);
-  for (const Run& run : runs_of(point))
-    matrix::subtract_product_3({pose.U.data(), 6, U + run.first, num_coupled(point), 6, run.size},
-                               &system.border()(pose.pose_offset, run.unknown), b_.size());
-}
-
-void RigTerms::eliminate(std::size_t point, const Vector3d& y, std::size_t share, std::size_t shares,
-                         ReducedSystem& system) const {
-  const double* U = U_.data() + 3 * (first_coupling_[point] - first_coupling_[range_.begin]);
-  const std::span<const Run> runs = runs_of(point);
-  const std::ptrdiff_t count = num_coupled(point), size = b_.size();
-  const auto begin = size * static_cast<std::ptrdiff_t>(share) / static_cast<std::ptrdiff_t>(shares);
-  const auto end = size * static_cast<std::ptrdiff_t>(share + 1) / static_cast<std::ptrdiff_t>(shares);
-  for (std::size_t b = 0; b < runs.size(); ++b) {
-    const std::ptrdiff_t first = std::max<std::ptrdiff_t>(begin, runs[b].unknown),
-                         last = std::min<std::ptrdiff_t>(end, runs[b].unknown + runs[b].size);
-    if (first >= last) continue;
-    const double* U_b = U + runs[b].first + (first - runs[b].unknown);
-    const int unknowns = static_cast<int>(last - first);
-    matrix::subtract_product_3({y.data(), 1, U_b, count, 1, unknowns}, &system.rhs()(border_.rows() + first), size);
+  const std::span runs(runs_.data() + first_run_[point], first_run_[point + 1] - first_run_[point]);
+  const Eigen::Index size = b_.size(), frames = border_.rows();
+  for (std::size_t a = 0; a < runs.size(); ++a) {
+    const auto subtract = [&](const double* left, std::ptrdiff_t left_stride, int rows, double* C) {
+      matrix::subtract_product_3({left, left_stride, U0 + runs[a].first, count, rows, runs[a].size}, C, size);
+    };
+    subtract(y.data(), 1, 1, &system.rhs()(frames + runs[a].unknown));
     // the columns of the lower triangle
-    for (std::size_t a = b; a < runs.size(); ++a)
-      matrix::subtract_product_3({U_b, count, U + runs[a].first, count, unknowns, runs[a].size},
-                                 &system.rig()(runs[a].unknown, first), size);
+    for (std::size_t b = 0; b <= a; ++b)
+      subtract(U0 + runs[b].first, count, runs[b].size, &system.rig()(runs[a].unknown, runs[b].unknown));
+    for (const PoseCoupling& pose : poses)
+      subtract(pose.U.data(), 6, 6, &system.border()(pose.pose_offset, runs[a].unknown));
   }
 }
 

@@ -1,18 +1,11 @@
 #include "system/stages.h"
 
-#include "base/thread_pool.h"
 #include "calibration/path_scale.h"
 #include "mapping/map_keyframe.h"
 #include "system/use_calibration.h"
 
 namespace bslam::system {
 namespace {
-
-// The number of threads that adjust a map. While a stage runs in sequential mode, nothing else does; in the other modes
-// the remaining threads belong to the frames.
-int threads_of_stages(const Config& config) {
-  return config.mode == execution::Mode::kSequential ? config.execution.available_threads() : 1;
-}
 
 // `rig_prior`: information of the given calibration if it is to be compared with the images of the map, otherwise null.
 execution::StageResult map_keyframe(const Config& config, const std::shared_ptr<const Eigen::MatrixXd>& rig_prior,
@@ -76,14 +69,12 @@ execution::StageResult calibrate(const Config& config, const camera::Rig& given_
   const int number = execution::calibration_due(task.keyframe, *base).value_or(0);
   if (left_out(number, config.calibration, *base, given_rig, first)) return {};
   const auto options = options_of(number, config.calibration);
-  ThreadPool pool(threads_of_stages(config));
-  auto refinement =
-      calibration::refine_if_accepted(*base, given_rig, options, config.feature_model(), stop, first, &pool);
+  auto refinement = calibration::refine_if_accepted(*base, given_rig, options, config.feature_model(), stop, first);
   if (!refinement) return {};
   // The path before the first one is too short to tell the scale better than the baselines.
   if (number > 0) calibration::keep_scale(options, *refinement);
   map::MapDraft draft(base);
-  use_calibration(*refinement, config, draft, stop, pool);
+  use_calibration(*refinement, config, draft, stop);
   const KeyframeId newest = base->newest_keyframe();
   if (draft.map().alive(newest) && draft.map().root_of(newest) >= first)
     calibration::move_submap(newest, base->keyframe(newest).T_rig_world, draft);
@@ -92,8 +83,7 @@ execution::StageResult calibrate(const Config& config, const camera::Rig& given_
 
 execution::StageResult adjust_globally(const Config& config, const map::MapSnapshot& base, std::stop_token stop) {
   map::MapDraft draft(base);
-  ThreadPool pool(threads_of_stages(config));
-  mapping::adjust_globally(config.mapping, config.feature_model(), draft, std::move(stop), &pool);
+  mapping::adjust_globally(config.mapping, config.feature_model(), draft, std::move(stop));
   return {std::move(draft), {}};
 }
 

@@ -167,10 +167,9 @@ void System::finish() {
     map::MapDraft draft(gate_.newest());
     const auto stop = interruption_.get_token();
     draft.set_twists(twists_from_neighbours(draft.map(), first_keyframe_, frames_));
-    ThreadPool pool(config_.execution.available_threads());
-    mapping::adjust_globally(config_.mapping, config_.feature_model(), draft, stop, &pool);
+    mapping::adjust_globally(config_.mapping, config_.feature_model(), draft, stop);
     final_adjustment_ms_ = watch.ms();
-    calibrate(draft, stop, pool);
+    calibrate(draft, stop);
     if (!stop.stop_requested()) executor_->commit(execution::JournalStep::kFinal, std::move(draft));
   }
   calibration_refined_ = !store_.snapshot()->rig().same_calibration(*initial_rig_);
@@ -194,19 +193,18 @@ void System::locate_early_frames() {
 
 // Estimates the calibration from the map. If it is accepted, adjusts the map again with it. With new moves of cameras,
 // it is estimated again.
-void System::calibrate(map::MapDraft& draft, const std::stop_token& stop, ThreadPool& pool) {
+void System::calibrate(map::MapDraft& draft, const std::stop_token& stop) {
   const auto& options = config_.calibration;
   if ((!options.check && options.refine == calibration::Refine::kFalse) || stop.stop_requested()) return;
   const Stopwatch watch;
   constexpr int kMaxEstimates = 3;
   bool again = true;
   for (int i = 0; i < kMaxEstimates && again && !stop.stop_requested(); ++i) {
-    auto estimate =
-        calibration::refine_rig(draft.map(), rig_, options, config_.feature_model(), stop, first_keyframe_, &pool);
+    auto estimate = calibration::refine_rig(draft.map(), rig_, options, config_.feature_model(), stop, first_keyframe_);
     const bool accepted = calibration::accepted(estimate, options);
     if (i == 0 || accepted) calibration_ = std::move(estimate);
     if (!accepted) break;
-    again = use_calibration(calibration_, config_, draft, stop, pool);
+    again = use_calibration(calibration_, config_, draft, stop);
   }
   calibration_.poses = {};                                   // part of the map now
   if (!draft.map().rig().same_calibration(*initial_rig_)) {  // a calibration during the run moves the roots

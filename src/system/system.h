@@ -120,7 +120,7 @@ class System {
   void discard_map();
   void bound_history();
   void locate_early_frames();
-  void calibrate(map::MapDraft& draft, const std::stop_token& stop, ThreadPool& pool);
+  void calibrate(map::MapDraft& draft, const std::stop_token& stop);
   void enqueue(FrameId frame, TimeNs time_ns);
   void mark_created_keyframes();
 

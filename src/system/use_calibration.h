@@ -14,6 +14,6 @@ namespace bslam::system {
 // before the move, so that an estimate from them is biased. Another one from the result is more accurate. Returns true
 // if there are new moves, which the map did not take into account before.
 bool use_calibration(const calibration::RigRefinement& refinement, const Config& config, map::MapDraft& draft,
-                     const std::stop_token& stop, ThreadPool& pool);
+                     const std::stop_token& stop);
 
 }  // namespace bslam::system

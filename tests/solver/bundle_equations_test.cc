@@ -6,7 +6,6 @@
 
 #include <tuple>
 
-#include "base/thread_pool.h"
 #include "solver/ceres_reference.h"
 #include "solver/lm.h"
 #include "solver/scene.h"
@@ -216,45 +215,6 @@ TEST(BundleEquations, ReachTheMinimumOfCeresWithFreeExtrinsics) {
     for (std::size_t c = 1; c < cameras; ++c) {
       EXPECT_LT(extrinsic_change(equations.state().rig.T_cam_rig[c], T_cam_rig[c]).norm(), 1e-4) << c;
     }
-  }
-}
-
-// Every number of the normal equations, of the step and of the cost after it is the same with one and several threads:
-// the points are divided among the threads, but every sum is added up in one order.
-TEST(BundleEquations, DoNotDependOnTheNumberOfThreads) {
-  for (const BlockType type : {BlockType::kExtrinsics, BlockType::kSharedTiming}) {
-    Random random(4, "threads");
-    BundleSpec spec;
-    spec.cameras = 4;
-    spec.points = 900;
-    const auto scene = scene::make_bundle_scene(spec, random);
-    for (std::size_t k = 0; k < scene->problem.T_rig_world.size(); ++k)
-      scene->problem.twist.push_back(scene::random_twist(random, 0.9, 1.2));
-    const BundleStructure structure = make_structure(scene->problem, squared_errors(scene->problem), {});
-    ASSERT_GE(point_ranges(structure).size(), 3u);
-    const RigBlocks blocks = make_blocks(type, scene->rig);
-    ThreadPool two(2), five(5);
-    const auto numbers = [&](ThreadPool* pool) {
-      BundleEquations equations(scene->problem, structure, blocks, Kernel::kHuber, 150, state_of(scene->problem), pool);
-      std::vector<double> out = {equations.linearise()};
-      const auto add = [&](const auto& matrix) {
-        for (Eigen::Index i = 0; i < matrix.size(); ++i) out.push_back(matrix.reshaped()(i));
-      };
-      for (const auto& block : equations.pose_blocks())
-        add(block.H.template triangularView<Eigen::Lower>().toDenseMatrix());
-      for (const auto& block : equations.point_blocks()) add(block.V);
-      add(equations.rig_terms().H().template triangularView<Eigen::Lower>().toDenseMatrix());
-      add(equations.rig_terms().b());
-      out.push_back(equations.solve(1e-4).value());
-      out.push_back(equations.trial_cost());
-      equations.accept();
-      for (const Vector3d& point : equations.state().points) add(point);
-      for (const SE3& T : equations.state().T_rig_world) add(T.matrix());
-      return out;
-    };
-    const std::vector<double> alone = numbers(nullptr);
-    EXPECT_EQ(numbers(&two), alone);
-    EXPECT_EQ(numbers(&five), alone);
   }
 }
 
