@@ -68,14 +68,14 @@ def evaluate(
     """Computes the errors of an estimated trajectory, as `bslam eval` does.
 
     Args:
-        est: estimate: a file (TUM, EuRoC csv or KITTI poses) or an array (n, 8) like System.trajectory().
+        est: estimate: a file (TUM, EuRoC csv or KITTI poses) or an array (n, 8) like System.trajectory(). An array has
+            no name of a frame: without `camera` it is taken for poses of camera 0.
         gt: ground truth, in the same way.
         align: alignment of the estimate: a rigid transform, a similarity, or none.
         max_dt: maximum time difference in seconds between a pose and its ground truth.
         delta: time in seconds between the two poses of a relative error.
-            An array has no names of frames: without `camera` it is taken for poses of camera 0.
         gt_frame: frame of the ground truth poses; body needs `rig`, unless `est` is a file with poses of the body. To
-            compare an array of poses of the body with ground truth of the body, leave out both.
+            compare an array of poses of the body with ground truth of the body, leave out `gt_frame` and `rig`.
         rig: calibration with the poses of the cameras on the body. With ground truth of cam0, poses of another camera
             are compared with it by the rig.
         camera: camera of the rig whose poses are estimated; default: the one that the first line of the file `est`

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <exception>
 #include <filesystem>
+#include <iterator>
 #include <utility>
 
 #include "core/diagnostics.h"
@@ -127,7 +128,7 @@ void SlamRunner::run() {
   while (const auto images = synchronizer_->wait()) {
     try {
       take_over();
-      process(*images);
+      if (process(*images)) last_warning_.clear();
     } catch (const std::exception& error) {  // of an output, or for lack of memory; the next frame may succeed
       note_failure(error.what());
     }
@@ -142,9 +143,19 @@ void SlamRunner::note_failure(const std::string& what) {
     failure_ = text;
   }
   try {
-    log(bslam::LogLevel::kWarning, text);
+    warn(text);
   } catch (const std::exception&) {  // the diagnostics have it
   }
+}
+
+// Logs a failure of a frame, but not again for each of the frames that follow: what differs in its numbers is the same.
+void SlamRunner::warn(const std::string& text) {
+  constexpr int kEvery = 1000;
+  std::string words;
+  std::copy_if(text.begin(), text.end(), std::back_inserter(words), [](char c) { return c < '0' || c > '9'; });
+  const bool is_new = std::exchange(last_warning_, words) != words;
+  num_same_warnings_ = is_new ? 0 : num_same_warnings_ + 1;
+  if (num_same_warnings_ % kEvery == 0) log(bslam::LogLevel::kWarning, text);
 }
 
 // Continues with the System that a service has made.
@@ -170,15 +181,14 @@ void SlamRunner::keep_trajectory(const bslam::System& before) {
   if (!trajectory->empty()) earlier_.push_back(*std::move(trajectory));
 }
 
-void SlamRunner::process(const bslam::ImageBundle& images) {
+// Returns false if the frame was refused.
+bool SlamRunner::process(const bslam::ImageBundle& images) {
   const auto frame = system_->process(images);  // only this thread replaces system_
   std::optional<bslam::FrameResult> before;
-  const std::string failure = frame ? "" : frame.error().message();
-  bool is_new = false;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     last_frame_at_ = Clock::now();
-    is_new = std::exchange(failure_, failure) != failure;
+    failure_ = frame ? "" : frame.error().message();
     if (frame) {
       before = std::exchange(last_, *frame);
       ++frames_;
@@ -186,15 +196,16 @@ void SlamRunner::process(const bslam::ImageBundle& images) {
     }
   }
   if (!frame) {
-    if (is_new) log(bslam::LogLevel::kWarning, failure);
-    return;
+    warn(frame.error().message());
+    return false;
   }
   if (frame->tracking() && outputs_.pose) outputs_.pose(converter_.convert(*frame));
   report_changes(before, *frame);
   if (map_changed_.exchange(false)) cloud_due_ = true;
-  if (!frame->tracking()) return;
+  if (!frame->tracking()) return true;
   publish_cloud(*frame);
   publish_path(*frame);
+  return true;
 }
 
 void SlamRunner::report_changes(const std::optional<bslam::FrameResult>& before, const bslam::FrameResult& now) {

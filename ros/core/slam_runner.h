@@ -69,8 +69,9 @@ class SlamRunner {
   void run();
   void take_over();
   void keep_trajectory(const bslam::System& before);
-  void process(const bslam::ImageBundle& images);
+  bool process(const bslam::ImageBundle& images);
   void note_failure(const std::string& what);
+  void warn(const std::string& text);
   void note_drop(const bslam::DroppedImage& image);
   void report_changes(const std::optional<bslam::FrameResult>& before, const bslam::FrameResult& now);
   void publish_cloud(const bslam::FrameResult& frame);
@@ -103,6 +104,8 @@ class SlamRunner {
   std::size_t cloud_subscribers_ = 0;  // at the last frame
   bool cloud_published_ = false, path_published_ = false;
   std::vector<bslam::Trajectory> earlier_;  // of the Systems that were replaced; the thread's
+  std::string last_warning_;                // of a frame, without its numbers; empty after a good frame; the thread's
+  int num_same_warnings_ = 0;               // after the first; the thread's
   bool stopped_ = false;
   std::mutex replacement_;  // held by the service that replaces the System
   std::thread thread_;

@@ -37,8 +37,8 @@ std::string name_of(const fs::path& path) {
   return fs::is_directory(whole, error) ? whole.filename().string() : whole.stem().string();
 }
 
-// The result of check_images() for each camera whose images are listed. It decodes an image, so that the cameras are
-// divided among threads.
+// The result of check_images() for each camera whose images are listed. It decodes one image or a few, so that the
+// cameras are divided among threads.
 std::vector<Status> check_all(const std::vector<Result<image_files::ImageList>>& lists, const camera::Rig& rig) {
   std::vector<Status> out(lists.size());
   ThreadPool pool(std::clamp(static_cast<int>(lists.size()), 1, processor_cores()));

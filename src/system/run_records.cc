@@ -73,6 +73,7 @@ std::vector<LoopRecord> RunRecords::loops() const {
 
 TimeNs RunRecords::keyframe_time(KeyframeId k) const {
   const std::lock_guard lock(mutex_);
+  // A keyframe is in the map a moment before it is recorded here.
   return k.index() < keyframe_time_ns_.size() ? keyframe_time_ns_[k.index()] : 0;
 }
 

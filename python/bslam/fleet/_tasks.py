@@ -18,8 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import _bslam
-from . import _interruption
 from .._program import PROGRAM
+from . import _interruption
 from ._cache import (
     FILES_ABOVE,
     Result,
