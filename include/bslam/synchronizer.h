@@ -49,7 +49,8 @@ struct SyncOptions {
   // dropped until its clock returns or the others have been silent for silent_after_s. If the clocks of all cameras
   // step, or there are no others, the step is accepted, but if it is longer than this time and than four intervals of
   // the camera, only at its third image; the first two are dropped. The first image is not trusted either: if it is
-  // ahead by more than this time of the next two, which agree with each other, it is dropped. Other clocks that go back
+  // ahead by more than this time of the next two, which agree with each other, it is dropped. Only that of a single
+  // camera waits for nothing, and if it is ahead, all images before its time are too late. Other clocks that go back
   // are not followed: create a new Synchronizer then, and a new System.
   double max_ahead_s = 1;
   // Maximum number of waiting images per camera; if it is exceeded, the oldest bundle is completed without its missing
