@@ -11,6 +11,8 @@
 namespace bslam_ros {
 namespace {
 
+constexpr std::size_t kLoggedEvery = 1000;  // of events that repeat, the first one is logged and then every n-th
+
 std::string describe(const bslam::DroppedImage& image, const bslam::Rig& rig) {
   return rig.camera(image.camera).name + ": image " + std::to_string(image.time_ns) +
          " ns dropped: " + std::string(to_string(image.reason));
@@ -113,13 +115,12 @@ void SlamRunner::reject(std::size_t camera, const bslam::Error& error) {
 
 // Logs the first image of each camera and reason, and then every thousandth one.
 void SlamRunner::note_drop(const bslam::DroppedImage& image) {
-  constexpr std::size_t kEvery = 1000;
   std::size_t count = 0;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     count = ++counts_[image.camera].dropped[static_cast<std::size_t>(image.reason)];
   }
-  if (count > 1 && count % kEvery != 0) return;
+  if (count > 1 && count % kLoggedEvery != 0) return;
   log(bslam::LogLevel::kWarning,
       describe(image, rig_) + (count == 1 ? "; further ones are counted" : ", " + std::to_string(count) + " so far"));
 }
@@ -150,12 +151,11 @@ void SlamRunner::note_failure(const std::string& what) {
 
 // Logs a failure of a frame, but not again for each of the frames that follow: what differs in its numbers is the same.
 void SlamRunner::warn(const std::string& text) {
-  constexpr int kEvery = 1000;
   std::string words;
   std::copy_if(text.begin(), text.end(), std::back_inserter(words), [](char c) { return c < '0' || c > '9'; });
   const bool is_new = std::exchange(last_warning_, words) != words;
   num_same_warnings_ = is_new ? 0 : num_same_warnings_ + 1;
-  if (num_same_warnings_ % kEvery == 0) log(bslam::LogLevel::kWarning, text);
+  if (num_same_warnings_ % kLoggedEvery == 0) log(bslam::LogLevel::kWarning, text);
 }
 
 // Continues with the System that a service has made.

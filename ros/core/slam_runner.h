@@ -105,7 +105,7 @@ class SlamRunner {
   bool cloud_published_ = false, path_published_ = false;
   std::vector<bslam::Trajectory> earlier_;  // of the Systems that were replaced; the thread's
   std::string last_warning_;                // of a frame, without its numbers; empty after a good frame; the thread's
-  int num_same_warnings_ = 0;               // after the first; the thread's
+  std::size_t num_same_warnings_ = 0;       // after the first; the thread's
   bool stopped_ = false;
   std::mutex replacement_;  // held by the service that replaces the System
   std::thread thread_;

@@ -23,13 +23,9 @@ constexpr std::size_t kMaxMaskBytes = std::size_t{1} << 30;
 
 Result<image::Image> read_mask(const camera::Camera& camera) {
   if (camera.mask_file.empty()) return image::Image();
-  std::error_code error;
-  for (auto outer = std::filesystem::path(camera.mask_file).parent_path(); outer.has_relative_path();
-       outer = outer.parent_path()) {
-    if (std::filesystem::is_regular_file(outer, error))
-      return Error{camera.mask_file, "", "a mask inside of the recording " + outer.string(),
-                   "a PNG file: the library reads no recordings; mask: FILE in the rig file names another one"};
-  }
+  if (const auto recording = image_files::recording_around(camera.mask_file))
+    return Error{camera.mask_file, "", "a mask inside of the recording " + recording->string(),
+                 "a PNG file: the library reads no recordings; mask: FILE in the rig file names another one"};
   const auto bytes = read_file(camera.mask_file, kMaxMaskBytes);
   if (!bytes) return bytes.error();
   auto mask = image_files::is_complete_png(*bytes) ? image_files::decode_grey_png(*bytes) : std::nullopt;

@@ -120,11 +120,8 @@ Result<image_files::StoredImage> read_stored(const image_files::ImageFile& image
 
 // The bytes of a mask, which may be inside of a recording of bslam live.
 Result<std::string> mask_bytes(const std::filesystem::path& file) {
-  std::error_code error;
-  for (auto outer = file.parent_path(); outer.has_relative_path(); outer = outer.parent_path()) {
-    if (std::filesystem::is_regular_file(outer, error))
-      return containers::read_attachment(outer, file.lexically_relative(outer).generic_string());
-  }
+  if (const auto recording = image_files::recording_around(file))
+    return containers::read_attachment(*recording, file.lexically_relative(*recording).generic_string());
   return read_file(file, kMaxImageBytes);
 }
 

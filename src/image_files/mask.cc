@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <span>
+#include <system_error>
 #include <utility>
 
 namespace bslam::image_files {
@@ -19,6 +20,14 @@ Result<image::Image> checked_mask(image::Image mask, const camera::Camera& camer
                  "positive values for the pixels to use"};
   }
   return mask;
+}
+
+std::optional<std::filesystem::path> recording_around(const std::filesystem::path& mask_file) {
+  std::error_code error;
+  for (auto outer = mask_file.parent_path(); outer.has_relative_path(); outer = outer.parent_path()) {
+    if (std::filesystem::is_regular_file(outer, error)) return outer;
+  }
+  return std::nullopt;
 }
 
 }  // namespace bslam::image_files
